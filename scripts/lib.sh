@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# shellcheck shell=bash
 # What the set-up, ./demo and ./check share. Sourced by bash; expects `set -euo pipefail`.
 
 ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+# shellcheck disable=SC2034  # used by the scripts that source this
 VENV=$ROOT/.venv
 STAMPS=$ROOT/build/stamps
 export DEBIAN_FRONTEND=noninteractive PIP_DISABLE_PIP_VERSION_CHECK=1 PYTHONUNBUFFERED=1
@@ -20,7 +22,7 @@ lock_setup() {
   flock -n 9 || { say "waiting for another set-up in this folder"; flock 9; }
 }
 
-# --- Debian packages -------------------------------------------------------------------------------
+# --- Debian packages ------------------------------------------------------------------------------
 
 # apt_install PACKAGE...: installs those that are missing, and nothing where none is.
 apt_install() {
@@ -64,7 +66,7 @@ apt_install() {
   done
 }
 
-# --- stamps: a step whose inputs are as they were is not run again ---------------------------------
+# --- stamps: a step whose inputs are as they were is not run again --------------------------------
 
 # stamp_is NAME VALUE: true where step NAME last ended well with VALUE.
 stamp_is() { [ "$(cat "$STAMPS/$1" 2>/dev/null)" = "$2" ]; }
@@ -79,7 +81,7 @@ hash_of() {
     LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum | cut -d' ' -f1)
 }
 
-# --- Python ----------------------------------------------------------------------------------------
+# --- Python ---------------------------------------------------------------------------------------
 
 python_is_311() {
   "$1" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' >/dev/null 2>&1
