@@ -36,6 +36,7 @@ PLATFORM = "linux_x86_64"
 
 # The oldest date a zip can hold: archives of equal content are equal byte for byte.
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)
+ZIP_EPOCH = "315532800"
 
 # What the wheel is made of; its build is repeated when any of this changes.
 WHEEL_INPUTS = (
@@ -161,7 +162,12 @@ def build_wheel(target: Target, version: str) -> Path:
         shutil.rmtree(folder, ignore_errors=True)
     tools = Path(target.python).parent
     path = f"{tools}{os.pathsep}{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    env = {**os.environ, "PATH": path, "CMAKE_BUILD_PARALLEL_LEVEL": str(os.cpu_count() or 1)}
+    env = {
+        **os.environ,
+        "PATH": path,
+        "CMAKE_BUILD_PARALLEL_LEVEL": str(os.cpu_count() or 1),
+        "SOURCE_DATE_EPOCH": ZIP_EPOCH,
+    }
     pip_wheel = [target.python, "-m", "pip", "wheel", ROOT, "--wheel-dir", raw]
     pip_wheel += ["--no-deps", "--no-build-isolation", "--no-input", "--disable-pip-version-check"]
     # One build folder an ABI that stays: a second build compiles only what has changed.
@@ -265,6 +271,7 @@ def filled_manifest(text: str, version: str, abi: str, wheels: list[Path]) -> st
     if newest:
         lines.append(f'blender_version_max = "{newest}"')
     text = substitute(text, r'^blender_version_min = ".*"$', "\n".join(lines), where)
+    text = substitute(text, r"^platforms = \[\]$", 'platforms = ["linux-x64"]', where)
     listed = "".join(f'    "./wheels/{wheel.name}",\n' for wheel in wheels)
     return substitute(text, r"^wheels = \[[^\]]*\]$", f"wheels = [\n{listed}]", where)
 
