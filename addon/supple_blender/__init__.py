@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Supple for Blender: pose a mesh by its vertex groups and bake the result to a shape key.
+
+`supple_blender.api` (in an extension: `bl_ext.user_default.supple.api`) is the Python interface;
+the operators `bpy.ops.supple.*` and the sidebar tab "Supple" are thin layers over it.
+"""
+
+bl_info = {
+    "name": "Supple",
+    "author": "The Supple developers",
+    "version": (0, 0, 0),
+    "blender": (3, 4, 0),
+    "location": "View3D > Sidebar > Supple",
+    "description": "Pose a mesh by its vertex groups, keep its detail, bake shape keys",
+    "category": "Mesh",
+}
+
+# Kept apart from bl_info, which Blender replaces when the add-on is an extension.
+VERSION = bl_info["version"]
+
+from . import compat, handle_operators, panel, pose_operators, properties  # noqa: E402
+
+_MODULES = (properties, pose_operators, handle_operators, panel)
+_cli_commands = []
+
+
+def _run_command(arguments):
+    """`blender --command supple JOB.toml [--out DIR]`."""
+    from . import job
+
+    return job.main(arguments)
+
+
+def register():
+    for module in _MODULES:
+        module.register()
+    _cli_commands.extend(compat.register_cli_command("supple", _run_command))
+
+
+def unregister():
+    while _cli_commands:
+        compat.unregister_cli_command(_cli_commands.pop())
+    for module in reversed(_MODULES):
+        module.unregister()

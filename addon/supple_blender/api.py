@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Supple from Python: what the panel does, without operators.
+
+    obj = bpy.data.objects["Body"]
+    api.handles_from_groups(obj, held=["feet"])
+    bpy.data.objects["hand.L"].location.z += 0.3
+    api.bake(obj, "Wave")
+
+Every function raises `UserError` with one readable message and then leaves the file as it was. Call
+them from Blender's main thread.
+"""
+
+import bpy
+
+from . import handles, mesh_data, native, pose, shape_keys
+from .errors import UserError
+from .stages import Stages
+
+__all__ = [
+    "UserError",
+    "bake",
+    "check_mesh",
+    "collect_pose",
+    "handles_from_groups",
+    "prepare",
+    "rebind",
+    "rest_mesh",
+    "solve",
+]
+
+
+def handles_from_groups(obj, groups=(), held=None):
+    """Make a handle with an Empty for each vertex group in `groups` (none: all).
+
+    held: names of groups to hold where they are; None proposes those nearest the ground. Returns
+    the names of the handles added. The Empties are named after the groups and are children of obj.
+    """
+    return handles.create(bpy.context, obj, groups, held)[0]
+
+
+def rebind(obj):
+    """Bind the handles to the mesh as it is now, after its vertex count changed."""
+    handles.rebind(bpy.context, obj)
+
+
+def rest_mesh(obj):
+    """Return the rest shape of obj as arrays (`mesh_data.RestMesh`)."""
+    mesh_data.require_mesh(obj)
+    return mesh_data.collect(obj, handles.world_matrix(bpy.context, obj))
+
+
+def prepare(obj, stages=None):
+    """Compute what every solve on this mesh needs, once. Returns the `supple.PreparedMesh`."""
+    mesh_data.require_mesh(obj)
+    handles.require_bound(obj)
+    return pose.prepare(rest_mesh(obj), stages or Stages())
+
+
+def collect_pose(obj):
+    """Return the `pose.PoseInput` of obj: its rest shape and where its Empties are now."""
+    mesh_data.require_writable(obj)
+    world = handles.world_matrix(bpy.context, obj)
+    return pose.PoseInput(
+        rest=mesh_data.collect(obj, world),
+        motions=handles.motions(bpy.context, obj, world),
+        mode=obj.supple.mode.lower(),
+        network=obj.supple.network,
+    )
+
+
+def solve(obj, stages=None):
+    """Return the posed positions of obj as a `pose.Pose`; the file is not changed."""
+    return pose.solve(collect_pose(obj), stages or Stages())
+
+
+def bake(obj, name, overwrite=False, stages=None):
+    """Solve and write the result to shape key `name`; return the `pose.Pose`.
+
+    A key that Supple made and nobody changed is written again; any other needs overwrite=True.
+    """
+    mesh_data.require_writable(obj)
+    shape_keys.require_free(obj, name, overwrite)
+    result = solve(obj, stages)
+    shape_keys.write(obj, name, result.positions)
+    return result
+
+
+def check_mesh(obj):
+    """Return what is unusual about the mesh and what is done about it, one sentence each."""
+    rest = rest_mesh(obj)
+    found = pose.check(rest)
+    if rest.ngons:
+        found.append(f"{rest.ngons} faces have more than 4 corners; they are split into triangles.")
+    return found
+
+
+def native_problem():
+    """Return why the native part does not load, or ''."""
+    return native.problem()

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators for long work: synchronous from scripts, over a worker thread from the panel.
+
+The same three steps either way: `collect` reads the scene, `compute` touches no bpy, `write`
+writes it. So a failed or cancelled operator leaves the file as it was.
+"""
+
+import threading
+
+import bpy
+
+from .errors import CancelledError, UserError
+from .stages import Stages
+
+TICK_SECONDS = 0.05
+
+# The Stages of the operator that runs in the window, for the panel; None when none does.
+running = None
+
+
+class Worker:
+    """Runs compute(stages) on a thread and keeps its result or exception."""
+
+    def __init__(self, compute, stages):
+        self._result = None
+        self._error = None
+        self._thread = threading.Thread(target=self._run, args=(compute, stages), daemon=True)
+        self._thread.start()
+
+    def _run(self, compute, stages):
+        try:
+            self._result = compute(stages)
+        except BaseException as error:  # handed to the main thread, which raises it
+            self._error = error
+
+    def is_alive(self):
+        return self._thread.is_alive()
+
+    def wait(self):
+        self._thread.join()
+
+    def result(self):
+        """Wait for the end; return what compute returned or raise what it raised."""
+        self.wait()
+        if self._error is not None:
+            raise self._error
+        return self._result
+
+
+class LongOperator:
+    """Mixin for operators. Subclasses define `collect`, `compute` and `write`.
+
+    collect(context) -> inputs; compute(inputs, stages) -> result; write(context, inputs, result) ->
+    message. Inputs have `.name`, the object's. All three may raise UserError.
+    """
+
+    _worker = None
+    _stages = None
+    _timer = None
+    _inputs = None
+
+    def execute(self, context):
+        try:
+            inputs = self.collect(context)
+            return self._finish(context, inputs, self.compute(inputs, Stages()))
+        except UserError as error:
+            return self._fail(error)
+
+    def invoke(self, context, event):
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
+        global running
+        if running is not None:
+            return self._fail(UserError("Supple is at work already. Wait for it, or press Esc."))
+        try:
+            self._inputs = inputs = self.collect(context)
+            self._stages = running = Stages()
+        except UserError as error:
+            return self._fail(error)
+        self._worker = Worker(lambda stages: self.compute(inputs, stages), self._stages)
+        manager = context.window_manager
+        manager.progress_begin(0, 100)
+        self._timer = manager.event_timer_add(TICK_SECONDS, window=context.window)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type == "ESC" and event.value == "PRESS":
+            self._stages.cancel()
+        if event.type != "TIMER":
+            return {"RUNNING_MODAL"}
+        if self._worker.is_alive():
+            self._show(context)
+            return {"RUNNING_MODAL"}
+        self._leave(context)
+        try:
+            return self._finish(context, self._inputs, self._worker.result())
+        except CancelledError:
+            self.report({"INFO"}, f"{self._inputs.name}: cancelled, nothing was changed")
+            return {"CANCELLED"}
+        except UserError as error:
+            return self._fail(error)
+
+    def cancel(self, context):
+        """Blender ends the operator, for instance because its window closes."""
+        self._stages.cancel()
+        self._worker.wait()
+        self._leave(context)
+
+    def _finish(self, context, inputs, result):
+        level, message = self.write(context, inputs, result)
+        self.report({level}, message)
+        return {"FINISHED"}
+
+    def _fail(self, error):
+        self.report({"ERROR"}, str(error))
+        return {"CANCELLED"}
+
+    def _show(self, context):
+        stopping = " (stopping)" if self._stages.cancelled else "   Esc: cancel"
+        context.window_manager.progress_update(int(100 * self._stages.fraction))
+        context.workspace.status_text_set(self._stages.text(self._inputs.name) + stopping)
+        _redraw_sidebars(context)
+
+    def _leave(self, context):
+        global running
+        running = None
+        manager = context.window_manager
+        manager.event_timer_remove(self._timer)
+        manager.progress_end()
+        context.workspace.status_text_set(None)
+        _redraw_sidebars(context)
+
+
+def _redraw_sidebars(context):
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()

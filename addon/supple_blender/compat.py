@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every difference between Blender 3.4 and 5.x that the add-on meets, in one place."""
+
+import bpy
+import numpy as np
+
+
+def read_key(key):
+    """Return the positions of a shape key, (n, 3) float32."""
+    positions = np.empty(3 * len(key.data), dtype=np.float32)
+    if hasattr(key, "points"):  # 4.1 and later: a plain array, 30 times faster
+        key.points.foreach_get("co", positions)
+    else:
+        key.data.foreach_get("co", positions)
+    return positions.reshape(-1, 3)
+
+
+def write_key(mesh, key, positions):
+    """Set the positions of a shape key of `mesh`; positions is (n, 3)."""
+    flat = np.ascontiguousarray(positions, dtype=np.float32).reshape(-1)
+    if hasattr(key, "points"):
+        key.points.foreach_set("co", flat)
+    else:
+        key.data.foreach_set("co", flat)
+    mesh.update()  # up to 4.2 a rewritten key is not evaluated again without it
+
+
+def add_key(obj, name):
+    """Add a shape key that equals the Basis and return it, with value 1.
+
+    New keys start at 0 up to Blender 4.5 and at 1 from 5.0, so the value is always set.
+    """
+    key = obj.shape_key_add(name=name, from_mix=False)
+    key.value = 1.0
+    return key
+
+
+def draw_progress(layout, fraction, text):
+    """Draw a progress bar, or its text where Blender has no bar (before 4.0)."""
+    if hasattr(layout, "progress"):
+        layout.progress(factor=fraction, text=text)
+    else:
+        layout.label(text=text)
+
+
+def register_cli_command(name, function):
+    """Register `blender --command NAME` (4.2 and later). Returns a list of handles, maybe empty."""
+    if hasattr(bpy.utils, "register_cli_command"):
+        return [bpy.utils.register_cli_command(name, function)]
+    return []
+
+
+def unregister_cli_command(handle):
+    """Undo `register_cli_command` for one of the handles it gave."""
+    bpy.utils.unregister_cli_command(handle)
+
+
+def import_obj(path, up):
+    """Import a Wavefront OBJ with `up` ('Y' or 'Z') as the axis that points up, order kept."""
+    forward = {"Y": "NEGATIVE_Z", "Z": "Y"}[up]
+    bpy.ops.wm.obj_import(
+        filepath=str(path), forward_axis=forward, up_axis=up, use_split_objects=False
+    )

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What was computed once for a mesh and its handles, kept in memory.
+
+Entries are found by their content (geometry and handle vertices), so that a changed mesh, an undo,
+a renamed object or another file can never meet a stale one.
+"""
+
+import hashlib
+import threading
+from collections import OrderedDict
+
+import numpy as np
+
+from . import native, space
+
+# A prepared mesh of 100,000 vertices takes about 0.5 GB; more than a few would not be met again.
+CAPACITY = 4
+
+
+class _Cache:
+    def __init__(self):
+        self._lock = threading.Lock()
+        self._entries = OrderedDict()
+
+    def get(self, key):
+        with self._lock:
+            if key in self._entries:
+                self._entries.move_to_end(key)
+            return self._entries.get(key)
+
+    def put(self, key, value):
+        with self._lock:
+            self._entries[key] = value
+            while len(self._entries) > CAPACITY:
+                self._entries.popitem(last=False)
+
+    def clear(self):
+        with self._lock:
+            self._entries.clear()
+
+
+_meshes = _Cache()
+_editors = _Cache()
+
+
+def clear():
+    """Forget everything."""
+    _meshes.clear()
+    _editors.clear()
+
+
+def mesh_if_ready(rest):
+    """Return the `supple.PreparedMesh` of a RestMesh if it is kept, else None."""
+    return _meshes.get(rest.digest)
+
+
+def mesh(rest, stages, share=1.0):
+    """Return the `supple.PreparedMesh` of a RestMesh, computed unless it is kept already."""
+    found = _meshes.get(rest.digest)
+    if found is None:
+        progress = stages.begin("preparing", share)
+        found = native.supple().PreparedMesh(
+            space.to_solve_points(rest.stretch, rest.positions), rest.triangles, progress=progress
+        )
+        _meshes.put(rest.digest, found)
+    return found
+
+
+def _handles_key(handles):
+    digest = hashlib.blake2b(digest_size=16)
+    for handle in handles:
+        digest.update(handle.name.encode() + b"\0")
+        digest.update(np.int64(len(handle.vertices)).tobytes())
+        digest.update(np.ascontiguousarray(handle.vertices, dtype=np.int64).tobytes())
+    return digest.hexdigest()
+
+
+def editor(rest, prepared_mesh, handles, model, stages, share):
+    """Return the `supple.Editor` bound to the handles' vertices, made unless it is kept already.
+
+    model: what `supple.Editor` takes as a model, a name or a path (or None: without the network).
+    """
+    key = (rest.digest, _handles_key(handles), model)
+    found = _editors.get(key)
+    if found is None:
+        progress = stages.begin("binding handles", share)
+        found = native.supple().Editor(prepared_mesh, handles, model=model, progress=progress)
+        _editors.put(key, found)
+    return found

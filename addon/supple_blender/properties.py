@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Supple stores in the .blend, all of it on the posed object (`Object.supple`)."""
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+KINDS = (
+    ("MOVED", "Moved", "Follows its Empty"),
+    ("HELD", "Held", "Stays where the rest shape has it"),
+)
+MODES = (
+    ("NATURAL", "Natural", "Bends as bodies do"),
+    ("STIFF", "Stiff", "Keeps every part as rigid as it can"),
+)
+
+
+def _lock_when_held(handle, _context):
+    """A held handle's Empty does not move, so that nobody drags it in vain."""
+    if handle.empty:
+        empty = handle.empty
+        for lock in (empty.lock_location, empty.lock_rotation, empty.lock_scale):
+            lock[:] = [handle.kind == "HELD"] * 3
+
+
+class SUPPLE_PG_handle(bpy.types.PropertyGroup):
+    """One handle; its name is its vertex group's."""
+
+    kind: EnumProperty(name="Kind", items=KINDS, default="MOVED", update=_lock_when_held)
+    empty: PointerProperty(name="Empty", type=bpy.types.Object)
+    bind: FloatVectorProperty(
+        name="Bind",
+        description="The Empty's matrix at rest in the mesh's local coordinates, row by row",
+        size=16,
+    )
+
+
+class SUPPLE_PG_key(bpy.types.PropertyGroup):
+    """A shape key that Supple wrote (its name), and a fingerprint of what it wrote."""
+
+    digest: StringProperty()
+
+
+class SUPPLE_PG_body(bpy.types.PropertyGroup):
+    """A posed mesh object."""
+
+    handles: CollectionProperty(type=SUPPLE_PG_handle)
+    active_handle: IntProperty(name="Active Handle")
+    collection: PointerProperty(name="Empties", type=bpy.types.Collection)
+    bound_vertices: IntProperty(
+        name="Bound Vertices", description="The vertex count when the handles were made"
+    )
+    keys: CollectionProperty(type=SUPPLE_PG_key)
+    made_basis: BoolProperty(
+        name="Made Basis", description="Supple added the Basis, for its preview alone"
+    )
+    mode: EnumProperty(name="Mode", items=MODES, default="NATURAL")
+    network: BoolProperty(
+        name="Learned Detail",
+        description="Use what was learned from bodies; off compares with the plain solve",
+        default=True,
+    )
+    key_name: StringProperty(
+        name="Shape Key", description="The shape key that Bake writes", default="Pose 1"
+    )
+
+
+_CLASSES = (SUPPLE_PG_handle, SUPPLE_PG_key, SUPPLE_PG_body)
+
+
+def register():
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.Object.supple = PointerProperty(type=SUPPLE_PG_body)
+
+
+def unregister():
+    del bpy.types.Object.supple
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

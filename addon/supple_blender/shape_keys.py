@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Writing shape keys without touching those that others made."""
+
+import hashlib
+from contextlib import contextmanager
+
+import bpy
+import numpy as np
+
+from . import compat
+from .errors import UserError
+
+PREVIEW = "Supple Preview"
+
+
+def _digest(positions):
+    return hashlib.blake2b(np.ascontiguousarray(positions).tobytes(), digest_size=16).hexdigest()
+
+
+def _find(obj, name):
+    keys = obj.data.shape_keys
+    return keys.key_blocks.get(name) if keys else None
+
+
+def made(obj, name):
+    """Return whether Supple wrote a key of this name; somebody may have changed it since."""
+    return name in obj.supple.keys
+
+
+def is_ours(obj, name):
+    """Return whether Supple wrote shape key `name` and nobody changed its shape since."""
+    key, record = _find(obj, name), obj.supple.keys.get(name)
+    return bool(key and record) and record.digest == _digest(compat.read_key(key))
+
+
+def require_free(obj, name, overwrite=False):
+    """Raise UserError unless shape key `name` may be written on mesh object obj."""
+    if not name.strip():
+        raise UserError(f"{obj.name}: the shape key has no name. Give it one.")
+    keys = obj.data.shape_keys
+    if keys and not keys.use_relative:
+        raise UserError(
+            f"{obj.name}: its shape keys are absolute. "
+            "Switch on Relative (Properties > Data > Shape Keys)."
+        )
+    key = _find(obj, name)
+    if key is None:
+        return
+    if key == keys.reference_key:
+        raise UserError(f"{obj.name}: '{name}' is the rest shape. Choose another name.")
+    if not overwrite and not is_ours(obj, name):
+        raise UserError(
+            f"{obj.name}: shape key '{name}' was made or changed by someone else. "
+            "Choose another name, or switch on Overwrite."
+        )
+
+
+@contextmanager
+def _object_mode(obj):
+    """Leave Edit Mode for a while: it would write its own copy of the keys over ours."""
+    editing = obj.mode == "EDIT"
+    if editing:
+        bpy.ops.object.mode_set(mode="OBJECT")
+    try:
+        yield
+    finally:
+        if editing:
+            bpy.ops.object.mode_set(mode="EDIT")
+
+
+def _write(obj, name, positions):
+    if not obj.data.shape_keys:
+        compat.add_key(obj, "Basis")
+        obj.supple.made_basis = True
+    key = _find(obj, name) or compat.add_key(obj, name)
+    compat.write_key(obj.data, key, positions)
+    obj.active_shape_key_index = obj.data.shape_keys.key_blocks.find(name)
+    record = obj.supple.keys.get(name) or obj.supple.keys.add()
+    record.name = name
+    record.digest = _digest(compat.read_key(key))
+    return key
+
+
+def _remove_preview(obj):
+    if not is_ours(obj, PREVIEW):
+        return
+    obj.shape_key_remove(_find(obj, PREVIEW))
+    obj.supple.keys.remove(obj.supple.keys.find(PREVIEW))
+    if obj.supple.made_basis and len(obj.data.shape_keys.key_blocks) == 1:
+        obj.shape_key_clear()
+        obj.supple.made_basis = False
+
+
+def write(obj, name, positions):
+    """Write local positions (n, 3) to shape key `name` and return its name.
+
+    Adds the Basis if there is none and the key if there is none, with value 1; a key that exists
+    keeps its value. Every other key is left as it is, except that the preview goes. Call
+    `require_free` before.
+    """
+    with _object_mode(obj):
+        if name != PREVIEW:
+            _remove_preview(obj)
+        _write(obj, name, positions)
+        if name != PREVIEW:
+            obj.supple.made_basis = False  # a baked key needs it: it is the user's from now on
+    return name
+
+
+def remove_preview(obj):
+    """Remove the preview key, and the Basis if it came with it and nothing else needs it."""
+    if is_ours(obj, PREVIEW):
+        with _object_mode(obj):
+            _remove_preview(obj)
+
+
+def others_on(obj, name):
+    """Return the names of keys other than `name` that add to what is seen."""
+    blocks = obj.data.shape_keys.key_blocks[1:]
+    on = [key.name for key in blocks if not key.mute and abs(key.value) > 1e-6]
+    return [other for other in on if other != name]

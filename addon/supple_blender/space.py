@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The three spaces a pose passes through, and the way between them.
+
+local: the mesh's own coordinates. world: Blender's. solve: local coordinates stretched by the
+object's scale, so that it is congruent to what the viewport shows (up to a rotation, a reflection
+and one uniform scale, which the solve does not see). Without it a non-uniformly scaled object would
+be posed as if it had not been scaled, and a rigid motion in the viewport would not stay rigid.
+
+Matrices act on columns, as Blender's; points are rows.
+"""
+
+import numpy as np
+
+from .errors import UserError
+
+# A smaller ratio of two axis scales is taken for a flattened object.
+MIN_SCALE_RATIO = 1e-6
+
+
+def as_array(matrix):
+    """Return a Blender matrix as a float64 array."""
+    return np.array(matrix, dtype=np.float64)
+
+
+def _stretch(world, name):
+    """Return the symmetric S (3, 3) of the polar decomposition world = Q S."""
+    linear = world[:3, :3]
+    squared, axes = np.linalg.eigh(linear.T @ linear)
+    scales = np.sqrt(np.maximum(squared, 0.0))
+    if not np.isfinite(scales).all() or scales[0] <= MIN_SCALE_RATIO * scales[-1]:
+        raise UserError(
+            f"{name}: the object is scaled to zero along an axis. "
+            "Give it a scale other than 0 on X, Y and Z."
+        )
+    return (axes * scales) @ axes.T
+
+
+def solve_stretch(world, name):
+    """Return the (3, 3) map from local to solve space, with determinant 1.
+
+    It is rounded, so that turning an object, which moves the last digits, leaves it as it was.
+    Raises UserError for an object scaled to zero; `name` is the object's.
+    """
+    stretch = _stretch(world, name)
+    stretch = np.round(stretch / np.cbrt(np.linalg.det(stretch)), 5)
+    return np.eye(3) if np.abs(stretch - np.eye(3)).max() < 2e-5 else stretch
+
+
+def to_solve_points(stretch, points):
+    """Map local points (n, 3) to solve space."""
+    return points @ stretch.T
+
+
+def to_local_points(stretch, points):
+    """Map points (n, 3) in solve space back to local."""
+    return points @ np.linalg.inv(stretch).T
+
+
+def to_solve_matrix(stretch, matrix):
+    """Map a local motion (4, 4) to the same motion in solve space."""
+    full = np.eye(4)
+    full[:3, :3] = stretch
+    return full @ matrix @ np.linalg.inv(full)
+
+
+def to_local_matrix(world, motion):
+    """Map a world motion (4, 4) of an object's points to its local coordinates."""
+    return np.linalg.inv(world) @ motion @ world
+
+
+def to_world_points(world, points):
+    """Map local points (n, 3) to world."""
+    return points @ world[:3, :3].T + world[:3, 3]
+
+
+def bind_matrix(world, centroid, name):
+    """Return the local (4, 4) frame of a handle at rest: at `centroid`, with the object's axes.
+
+    In world its axes are orthonormal and one unit long whatever the object's scale, so that turning
+    an Empty placed there turns the handle without shear.
+    """
+    rotation = world[:3, :3] @ np.linalg.inv(_stretch(world, name))
+    frame = np.eye(4)
+    frame[:3, :3] = rotation * np.sign(np.linalg.det(rotation))
+    frame[:3, 3] = to_world_points(world, centroid[None])[0]
+    return np.linalg.inv(world) @ frame

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Progress of a computation with several native calls, readable from another thread."""
+
+from . import native
+
+
+class Stages:
+    """Shares of the whole (they sum to 1), each with the progress of the native call in it."""
+
+    def __init__(self):
+        self.label = ""
+        self._done = 0.0
+        self._share = 0.0
+        self._progress = None
+        self._cancelled = False
+
+    def begin(self, label, share):
+        """Start the next stage and return the `supple.Progress` for its native call."""
+        self._done += self._share
+        progress = native.supple().Progress()
+        if self._cancelled:
+            progress.cancel()
+        self.label, self._share, self._progress = label, share, progress
+        return progress
+
+    @property
+    def fraction(self):
+        """How much of the whole is done, 0..1."""
+        inner = self._progress.fraction if self._progress else 0.0
+        return min(1.0, self._done + self._share * inner)
+
+    @property
+    def seconds_left(self):
+        """Seconds to go in this stage, or None while nobody knows."""
+        return self._progress.seconds_left if self._progress else None
+
+    @property
+    def cancelled(self):
+        return self._cancelled
+
+    def cancel(self):
+        """End the computation at its next check."""
+        self._cancelled = True
+        if self._progress:
+            self._progress.cancel()
+
+    def text(self, name):
+        """Return one line for the status bar: what is done to object `name`, how far, how long."""
+        line = f"{name}: {self.label} {self.fraction:.0%}"
+        seconds = self.seconds_left
+        return line if seconds is None else f"{line}, about {seconds:.0f} s left"
