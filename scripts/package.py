@@ -171,7 +171,7 @@ def build_wheel(target: Target, version: str) -> Path:
     pip_wheel = [target.python, "-m", "pip", "wheel", ROOT, "--wheel-dir", raw]
     pip_wheel += ["--no-deps", "--no-build-isolation", "--no-input", "--disable-pip-version-check"]
     # One build folder an ABI that stays: a second build compiles only what has changed.
-    run(*pip_wheel, f"-Cbuild-dir={BUILD / f'wheel-{target.abi}'}", env=env)
+    run(*pip_wheel, f"--config-settings=build-dir={BUILD / f'wheel-{target.abi}'}", env=env)
     (wheel,) = raw.glob("*.whl")
 
     say("bundling its libraries")
