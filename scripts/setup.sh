@@ -50,15 +50,16 @@ setup_build() {
 
 setup_blender() {
   section "Set-up: Debian's Blender"
-  # Blender's Python scripts import NumPy, which its package does not ask for.
-  apt_install blender python3-numpy
+  # Blender's Python scripts import NumPy, and Workbench draws through EGL where there is no display:
+  # its package asks for neither.
+  apt_install blender python3-numpy libegl1 libgl1-mesa-dri
 }
 
 setup_tests() {
   section "Set-up: test environments"
   # The second line is what the bpy module links to but its wheel does not carry.
-  apt_install xvfb xauth xdotool libgl1-mesa-dri \
-    libx11-6 libxi6 libxxf86vm1 libxfixes3 libxrender1 libxkbcommon0 libsm6 libice6 libgl1 libegl1
+  apt_install xvfb xauth xdotool \
+    libx11-6 libxi6 libxxf86vm1 libxfixes3 libxrender1 libxkbcommon0 libsm6 libice6 libgl1
 
   local wanted
   make_venv "$ROOT/.venv-bpy" "$(readlink -f "$VENV/bin/python")"
