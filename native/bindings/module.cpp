@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bindings.h"
+
+PYBIND11_MODULE(_native, module) {
+  module.doc() = "Native core of Supple; use the package `supple`, which checks and documents.";
+  module.attr("__version__") = SUPPLE_VERSION;
+  supple::bindings::bind_core(module);
+  supple::bindings::bind_geometry(module);
+  supple::bindings::bind_learning(module);
+  supple::bindings::bind_tasks(module);
+}

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+
+#include "supple/core/types.h"
+#include "supple/geometry/sparse_cholesky.h"
+
+namespace supple {
+
+/// A symmetric positive semidefinite system A X = B in which some rows of X are given ("held").
+/// The Poisson and biharmonic solves of this library are all of this form. Factored once for a set of
+/// held rows; a solve is two back-substitutions.
+class HeldSystem {
+ public:
+  /// matrix: n x n, definite once the held rows are taken out. held: distinct indices in [0, n).
+  /// Errors: `index_out_of_range`, `not_positive_definite`.
+  HeldSystem(const SparseMatrix& matrix, const Eigen::VectorXi& held,
+             SparseCholesky::Backend backend = SparseCholesky::default_backend());
+
+  const Eigen::VectorXi& held() const { return held_; }
+  /// rhs: n x 3 (held rows ignored). held_values: one row for each held index, in `held` order.
+  /// Returns n x 3 with the held rows exactly as given.
+  Points solve(const Points& rhs, const Points& held_values) const;
+  /// Gradient with respect to `rhs` (n x 3, held rows 0) from the gradient with respect to `solve`.
+  Points solve_backward(const Points& grad) const;
+
+ private:
+  Eigen::VectorXi held_, free_;
+  SparseMatrix coupling_;  // free x held block
+  SparseCholesky factor_;
+};
+
+/// Poisson equation of a mesh without held vertices, W V = rhs, each component placed so that its
+/// mass-weighted centroid is 0. Source: the paper, Eqn 3.
+class FreePoisson {
+ public:
+  /// laplacian: n x n; mass: n; component: n labels in [0, component_count).
+  FreePoisson(const SparseMatrix& laplacian, const Eigen::VectorXd& mass,
+              const Eigen::VectorXi& component, int component_count);
+
+  /// n x 3 to n x 3.
+  Points solve(const Points& rhs) const;
+  /// Gradient with respect to `rhs` from the gradient with respect to `solve`.
+  Points solve_backward(const Points& grad) const;
+  /// points minus each component's mass-weighted centroid.
+  Points centred(const Points& points) const;
+
+ private:
+  Points centred_backward(const Points& grad) const;
+
+  Eigen::VectorXd mass_;
+  Eigen::VectorXi component_;
+  Eigen::VectorXd component_mass_;
+  HeldSystem pinned_;  // one vertex a component held at 0; centring takes the choice back out
+};
+
+}  // namespace supple

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "supple/core/types.h"
+#include "supple/geometry/mesh.h"
+
+namespace supple {
+
+/// Every operator of a rest surface that the tasks use, built once. n vertices, m faces, area 1.
+struct SurfaceOperators {
+  explicit SurfaceOperators(const TriangleMesh& mesh);
+  /// vertices: n x 3 in surface units; faces: m x 3, none degenerate; component: n labels.
+  SurfaceOperators(Points vertices, Faces faces, Eigen::VectorXi component, int component_count);
+
+  Points vertices;
+  Faces faces;
+  Eigen::VectorXi component;
+  int component_count = 0;
+  Eigen::VectorXd face_areas;     ///< m
+  MatrixField inverse_frames;     ///< m x 9, E1^-1
+  Points face_normals;            ///< m x 3
+  Points vertex_normals;          ///< n x 3
+  SparseMatrix laplacian;         ///< n x n, W
+  Eigen::VectorXd mass;           ///< n, diagonal of M
+  SparseMatrix divergence;        ///< n x 3m, grad^T A
+  SparseRowMatrix average;        ///< n x m, uniform face -> vertex averaging
+
+  /// m x 9 Jacobians of moved n x 3 vertices.
+  MatrixField jacobians_of(const Points& moved) const;
+  /// n x 3 right-hand side grad^T A J of the Poisson equation.
+  Points divergence_of(const MatrixField& jacobians) const;
+  /// m x 9 gradient with respect to J from the one with respect to `divergence_of(J)`.
+  MatrixField divergence_backward(const Points& grad) const;
+};
+
+}  // namespace supple

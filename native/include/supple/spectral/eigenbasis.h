@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "supple/core/progress.h"
+#include "supple/core/types.h"
+
+namespace supple {
+
+/// The first eigenfunctions of W phi = lambda M phi, smallest eigenvalues first.
+struct Eigenbasis {
+  RowMatrix<double> functions;  ///< n x k, M-orthonormal
+  Eigen::VectorXd values;       ///< k, ascending, >= 0, in 1 / area
+  Eigen::VectorXd mass;         ///< n, the diagonal of M
+  /// Largest |M^-1/2 (W phi - lambda M phi)| / max(lambda, 1) over the pairs, checked on return.
+  double residual = 0.0;
+
+  Eigen::Index size() const { return values.size(); }
+  /// k' x c coefficients Phi^T M f of an n x c field in the first `count` functions.
+  RowMatrix<double> coefficients(const RowMatrix<double>& field, Eigen::Index count) const;
+  /// n x c field from k' x c coefficients.
+  RowMatrix<double> expand(const RowMatrix<double>& coefficients) const;
+  /// Spectral projection Phi Phi^T M f with the first `count` functions. Source: the paper, Eqn 7.
+  RowMatrix<double> project(const RowMatrix<double>& field, Eigen::Index count) const;
+  /// The largest count <= `limit` that does not cut through a (nearly) multiple eigenvalue. Beyond it
+  /// the span would depend on rounding, and a turned mesh would not give the turned result.
+  Eigen::Index stable_count(Eigen::Index limit) const;
+};
+
+struct EigenbasisOptions {
+  int count = 128;            ///< eigenfunctions wanted; min(count, n) are returned
+  double residual = 1e-9;     ///< the stated residual
+  int max_iterations = 1000;  ///< Lanczos restarts
+};
+
+/// laplacian: n x n cotangent Laplacian; mass: n, positive. Shift-invert Lanczos (Spectra) on the
+/// Cholesky factor, dense below 3 * count vertices. Multiple eigenvalues (several components, symmetric
+/// shapes) are found whole: the number below the largest is checked by Sylvester's law of inertia.
+/// Errors: `no_convergence` with the residual reached; `cancelled`.
+Eigenbasis eigenbasis(const SparseMatrix& laplacian, const Eigen::VectorXd& mass,
+                      const EigenbasisOptions& options, ProgressRange progress = {});
+
+}  // namespace supple

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "supple/learning/trainer.h"
+
+#include <numeric>
+#include <string>
+
+#include "supple/core/error.h"
+
+namespace supple {
+namespace {
+
+// Uniform in [0, count); the library's distributions differ between implementations.
+int draw(std::mt19937_64& generator, int count) {
+  return static_cast<int>(generator() % static_cast<uint64_t>(count));
+}
+
+void check(const TrainOptions& options, size_t pairs) {
+  if (pairs == 0) {
+    throw Error(ErrorCode::bad_option, "Training needs at least one pair.");
+  }
+  if (options.epochs < 1 || options.samples < 0 || options.fewest_eigenfunctions < 1 ||
+      options.most_eigenfunctions < options.fewest_eigenfunctions) {
+    throw Error(ErrorCode::bad_option,
+                "Training needs epochs >= 1, samples >= 0 and a range of eigenfunctions that starts "
+                "at 1 or more.");
+  }
+  if (options.architecture.configuration == Configuration::paper && options.samples != 0) {
+    throw Error(ErrorCode::bad_option,
+                "The 'paper' configuration is evaluated at every vertex: set samples to 0.");
+  }
+}
+
+TriangleMesh checked(const Points& vertices, const Faces& faces, int pair, const char* side) {
+  try {
+    return TriangleMesh(vertices, faces);
+  } catch (const Error& error) {
+    throw Error(error.code(),
+                "Pair " + std::to_string(pair) + ", " + side + ": " + error.what());
+  }
+}
+
+}  // namespace
+
+template <class Scalar>
+struct Trainer<Scalar>::Example {
+  Example(const TrainingPair& pair, int index, const TrainOptions& options,
+          const ProgressRange& progress)
+      : mesh(checked(pair.source, pair.faces, index, "source")), operators(mesh) {
+    if (pair.target.rows() != pair.source.rows()) {
+      throw Error(ErrorCode::wrong_shape,
+                  "Pair " + std::to_string(index) + " has " + std::to_string(pair.source.rows()) +
+                      " source vertices and " + std::to_string(pair.target.rows()) +
+                      " target vertices; they must be the same vertices.");
+    }
+    const TriangleMesh moved = checked(pair.target, pair.faces, index, "target");
+    if (moved.surface_vertices().rows() != operators.vertices.rows()) {
+      throw Error(ErrorCode::wrong_shape,
+                  "Pair " + std::to_string(index) + " has vertices attached on one side only.");
+    }
+    target.resize(operators.vertices.rows(), 3);
+    for (Eigen::Index i = 0; i < target.rows(); ++i) {
+      target.row(i) = pair.target.row(mesh.mesh_vertex()[i]);
+    }
+    target = mesh.to_surface(target);
+    poisson = std::make_unique<FreePoisson>(operators.laplacian, operators.mass,
+                                            operators.component, operators.component_count);
+    // One more than is used: where to cut is read from the gap above.
+    basis = eigenbasis(operators.laplacian, operators.mass,
+                       {.count = options.architecture.eigenfunctions + 1}, progress);
+    if (options.architecture.signal == SignalKind::spectral) {
+      const SurfaceOperators other(moved);
+      target_basis = eigenbasis(other.laplacian, other.mass,
+                                {.count = options.most_eigenfunctions + 1}, progress);
+    }
+    context = std::make_unique<NetworkContext<Scalar>>(
+        operators, basis, options.architecture.eigenfunctions, options.samples);
+  }
+
+  TriangleMesh mesh;
+  SurfaceOperators operators;
+  Points target;  // surface units of the source
+  Eigenbasis basis, target_basis;
+  std::unique_ptr<FreePoisson> poisson;
+  std::unique_ptr<NetworkContext<Scalar>> context;
+};
+
+template <class Scalar>
+Trainer<Scalar>::Trainer(const std::vector<TrainingPair>& pairs, const TrainOptions& options,
+                         ProgressRange progress)
+    : options_(options),
+      network_(options.architecture, options.seed),
+      adam_(options.architecture.sizes()),
+      generator_(options.seed) {
+  check(options, pairs.size());
+  for (size_t i = 0; i < pairs.size(); ++i) {
+    progress.report(static_cast<double>(i) / static_cast<double>(pairs.size()));
+    examples_.push_back(
+        std::make_unique<Example>(pairs[i], static_cast<int>(i), options, ProgressRange{}));
+  }
+  order_.resize(pairs.size());
+  std::iota(order_.begin(), order_.end(), 0);
+  if (options.architecture.configuration == Configuration::equivariant) {
+    normalise_inputs();
+  }
+  progress.report(1.0);
+}
+
+template <class Scalar>
+Trainer<Scalar>::~Trainer() = default;
+
+template <class Scalar>
+int Trainer<Scalar>::total_steps() const {
+  return options_.epochs * static_cast<int>(examples_.size());
+}
+
+template <class Scalar>
+Signal Trainer<Scalar>::signal_of(const Example& example, int eigenfunctions) const {
+  if (options_.architecture.signal == SignalKind::rotation) {
+    return rotation_signal(example.operators.jacobians_of(example.target));
+  }
+  const Points coarse =
+      spectral_target(example.basis, example.target_basis, example.target, eigenfunctions);
+  return spectral_signal(example.operators, example.basis, coarse, eigenfunctions);
+}
+
+template <class Scalar>
+void Trainer<Scalar>::normalise_inputs() {
+  using Row = typename LocalJacobianNetwork<Scalar>::Row;
+  const int inputs = options_.architecture.sizes().inputs;
+  Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(inputs);
+  Eigen::RowVectorXd squares = Eigen::RowVectorXd::Zero(inputs);
+  double count = 0.0;
+  for (const auto& example : examples_) {
+    const int middle = (options_.fewest_eigenfunctions + options_.most_eigenfunctions) / 2;
+    const RowMatrix<double> raw =
+        network_.raw_inputs(*example->context, signal_of(*example, middle)).template cast<double>();
+    sum += raw.colwise().sum();
+    squares += raw.colwise().squaredNorm();
+    count += static_cast<double>(raw.rows());
+  }
+  const Eigen::RowVectorXd mean = sum / count;
+  const Eigen::RowVectorXd variance =
+      (squares / count - mean.cwiseProduct(mean)).cwiseMax(0.0);
+  // An input that hardly varies in training must not be blown up elsewhere.
+  constexpr double kFloor = 1e-3;
+  const Row scale = (variance.cwiseSqrt().array() + kFloor).inverse().template cast<Scalar>();
+  network_.set_normalisation(mean.template cast<Scalar>(), scale);
+}
+
+template <class Scalar>
+TrainStep Trainer<Scalar>::step() {
+  const int count = static_cast<int>(examples_.size());
+  if (next_ % count == 0) {
+    for (int i = count - 1; i > 0; --i) {
+      std::swap(order_[i], order_[draw(generator_, i + 1)]);
+    }
+  }
+  TrainStep result;
+  result.step = next_;
+  result.pair = order_[next_ % count];
+  result.learning_rate = decayed_learning_rate(
+      options_.first_learning_rate, options_.last_learning_rate, next_, total_steps());
+  const Example& example = *examples_[result.pair];
+  if (options_.architecture.signal == SignalKind::spectral) {
+    const int range = options_.most_eigenfunctions - options_.fewest_eigenfunctions + 1;
+    const int drawn = options_.fewest_eigenfunctions + draw(generator_, range);
+    result.eigenfunctions = static_cast<int>(
+        std::min(example.basis.stable_count(drawn), example.target_basis.stable_count(drawn)));
+  }
+
+  const Signal signal = signal_of(example, result.eigenfunctions);
+  typename LocalJacobianNetwork<Scalar>::Trace trace;
+  const MatrixField predicted = network_.forward(*example.context, signal, &trace);
+  MatrixField grad;
+  result.loss = supervised_loss(example.operators, *example.poisson, options_.weights,
+                                example.target, predicted, &grad);
+  auto gradient = LayerParameters<Scalar>::zeros(options_.architecture.sizes());
+  network_.backward(*example.context, signal, trace, grad, gradient);
+  adam_.step(gradient, result.learning_rate, network_.parameters());
+  ++next_;
+  return result;
+}
+
+template class Trainer<float>;
+template class Trainer<double>;
+
+}  // namespace supple
