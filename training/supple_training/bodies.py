@@ -58,7 +58,9 @@ class JointRange:
 
 
 _MIDDLE = (
-    JointRange(("spine05", "spine04", "spine03", "spine02", "spine01"), (-20, 55), (-30, 30), (-22, 22)),
+    JointRange(
+        ("spine05", "spine04", "spine03", "spine02", "spine01"), (-20, 55), (-30, 30), (-22, 22)
+    ),
     JointRange(("neck01", "neck02", "neck03", "head"), (-30, 35), (-50, 50), (-22, 22)),
 )
 

@@ -63,7 +63,10 @@ class PairSettings:
 
 
 def make_pair(settings: PairSettings, index: int) -> Pair:
-    """Pair number `index`, from 0. Raises RuntimeError when no good triangulation or pose is found."""
+    """Pair number `index`, from 0.
+
+    Raises RuntimeError when no good triangulation or pose is found.
+    """
     rng = np.random.default_rng([settings.seed, int(settings.held_out), index])
     body = bodies.sample_phenotype(rng, held_out=settings.held_out)
     other = body

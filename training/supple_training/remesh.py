@@ -75,7 +75,7 @@ def unit_normals(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, Flo
 
 
 def triangle_quality(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """(m,): 4 sqrt(3) area / sum of squared edges: 1 for an equilateral triangle, 0 for a flat one."""
+    """(m,): 4 sqrt(3) area / sum of squared edges: 1 for equilateral triangles, 0 for flat ones."""
     corner = vertices[faces]
     edges = corner - np.roll(corner, 1, axis=1)
     _, area = unit_normals(vertices, faces)
@@ -133,7 +133,9 @@ def _closest(
             < 0.03 + np.sqrt(distance[i])
         ]
         if len(near):
-            _, found, place = igl.point_mesh_squared_distance(points[i : i + 1], vertices, faces[near])
+            _, found, place = igl.point_mesh_squared_distance(
+                points[i : i + 1], vertices, faces[near]
+            )
             index[i], closest[i] = near[int(found[0])], place[0]
     corner = vertices[faces[index]]
     weights = igl.barycentric_coordinates(closest, corner[:, 0], corner[:, 1], corner[:, 2])

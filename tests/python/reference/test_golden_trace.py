@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Twenty training steps of the C++ trainer against an independent implementation in PyTorch."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from supple import _native
+
+pytest.importorskip("torch", reason="PyTorch is not installed; ./check installs it")
+import torch_reference as reference
+
+STEPS = 20
+WIDTH = 256
+EIGENFUNCTIONS = 48
+TOLERANCE = 1e-4
+
+
+def bumpy_sphere(rng: np.random.Generator, rings: int = 12, around: int = 17) -> tuple:
+    """A closed genus-0 mesh without symmetries: (n, 3) vertices and (m, 3) faces."""
+    polar = np.pi * (np.arange(1, rings) / rings)[:, None]
+    turn = 2 * np.pi * (np.arange(around) / around)[None, :] + 0.3 * polar
+    ring = np.stack(
+        [np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar + 0 * turn)], -1
+    )
+    vertices = np.concatenate([[[0, 0, 1]], ring.reshape(-1, 3), [[0, 0, -1]]])
+    radius = (
+        1 + 0.25 * np.sin(3 * vertices @ rng.normal(size=3)) + rng.normal(0, 0.02, len(vertices))
+    )
+    vertices = vertices * radius[:, None] * [1.0, 1.4, 2.1]
+    faces = []
+    south = len(vertices) - 1
+    for j in range(around):
+        after = (j + 1) % around
+        faces.append((0, 1 + j, 1 + after))
+        for i in range(rings - 2):
+            a, b = 1 + i * around + j, 1 + i * around + after
+            faces += [(a, a + around, b + around), (a, b + around, b)]
+        start = 1 + (rings - 2) * around
+        faces.append((start + j, south, start + after))
+    return vertices, np.array(faces, dtype=np.int32)
+
+
+def bent(vertices: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """The vertices twisted and bent along z, with a little noise: (n, 3)."""
+    x, y, z = vertices.T
+    twist = rng.uniform(0.2, 0.5) * z
+    x, y = np.cos(twist) * x - np.sin(twist) * y, np.sin(twist) * x + np.cos(twist) * y
+    angle = rng.uniform(0.2, 0.5) * (z - z.min())
+    moved = np.stack(
+        [x, np.cos(angle) * y - np.sin(angle) * z, np.sin(angle) * y + np.cos(angle) * z]
+    )
+    return moved.T * rng.uniform(0.9, 1.2) + rng.normal(0, 0.01, vertices.shape)
+
+
+@pytest.fixture(scope="module")
+def pairs() -> list[tuple]:
+    """Three pairs of different size and shape."""
+    rng = np.random.default_rng(5)
+    made = []
+    for rings in (11, 12, 14):
+        vertices, faces = bumpy_sphere(rng, rings)
+        made.append((vertices, faces, bent(vertices, rng)))
+    return made
+
+
+@pytest.fixture(scope="module")
+def torch_pairs(pairs) -> list[reference.Pair]:
+    return [reference.Pair(*pair) for pair in pairs]
+
+
+def native_run(pairs: list[tuple], kind: str) -> dict:
+    options = _native.TrainOptions()
+    options.architecture = _native.Architecture(
+        "paper", kind, eigenfunctions=EIGENFUNCTIONS, width=WIDTH
+    )
+    options.samples = 0  # every vertex, as the paper
+    options.epochs = 7
+    options.fewest_eigenfunctions, options.most_eigenfunctions = 15, 40
+    options.seed = 11
+    given = [_native.TrainingPair(*pair) for pair in pairs]
+    return _native.train_double(given, options, max_steps=STEPS)
+
+
+@pytest.mark.parametrize("kind", ["rotation", "spectral"])
+def test_twenty_steps_give_the_losses_and_weights_of_the_reference(pairs, torch_pairs, kind):
+    native = native_run(pairs, kind)
+    assert len(native["steps"]) == STEPS
+    assert {row["pair"] for row in native["steps"]} == {0, 1, 2}
+
+    network = reference.Network(native["initial"])
+    trace = reference.train(
+        torch_pairs,
+        network,
+        native["steps"],
+        kind=kind,
+        eigenfunctions=EIGENFUNCTIONS,
+        first=1e-3,
+        last=1e-5,
+        total=7 * len(pairs),
+    )
+    for row, (loss, jacobian, position, integrated) in zip(native["steps"], trace, strict=True):
+        assert row["loss"] == pytest.approx(loss, rel=TOLERANCE)
+        assert row["jacobian"] == pytest.approx(jacobian, rel=TOLERANCE)
+        assert row["position"] == pytest.approx(position, rel=TOLERANCE)
+        assert row["integrated"] == pytest.approx(integrated, rel=TOLERANCE)
+    assert trace[-1][0] < trace[0][0]
+
+    for layer, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
+        for name, value in (("weight", weight), ("bias", bias)):
+            before = native["initial"][f"layer.{layer}.{name}"]
+            ours = native["tensors"][f"layer.{layer}.{name}"]
+            theirs = value.detach().numpy()
+            assert np.abs(ours - theirs).max() <= TOLERANCE, f"layer {layer} {name}"
+            # Weights hardly move in twenty steps: what they moved by must agree as well.
+            learnt = np.linalg.norm(theirs - before)
+            assert learnt > 0.0
+            assert np.linalg.norm(ours - theirs) <= TOLERANCE * learnt, f"layer {layer} {name}"
+
+
+@pytest.mark.parametrize("kind", ["rotation", "spectral"])
+def test_the_comparison_notices_another_loss_weight(pairs, torch_pairs, kind, monkeypatch):
+    """The trace test is worth something only if a small change of the training fails it."""
+    native = native_run(pairs, kind)
+    monkeypatch.setattr(reference, "LOSS_WEIGHTS", (1.0, 10.0, 2.1))
+    trace = reference.train(
+        torch_pairs,
+        reference.Network(native["initial"]),
+        native["steps"][:3],
+        kind=kind,
+        eigenfunctions=EIGENFUNCTIONS,
+        first=1e-3,
+        last=1e-5,
+        total=7 * len(pairs),
+    )
+    assert trace[0][0] != pytest.approx(native["steps"][0]["loss"], rel=TOLERANCE)
+    assert trace[2][3] != pytest.approx(native["steps"][2]["integrated"], rel=TOLERANCE)
