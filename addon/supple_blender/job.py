@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pose without a window, from a job file.
+
+    blender -b [FILE.blend] --python-exit-code 1 -P job.py -- JOB.toml [--out DIR]
+    blender --command supple JOB.toml [--out DIR]                    (Blender 4.2 and later)
+
+The installed add-on does the work, enabled for this process if it is not; without one, the add-on
+that this file is part of. The exit code is 0 when everything asked for was written, else 1; then
+stderr says why and nothing was saved. docs/blender.md describes the job file.
+"""
+
+import argparse
+import importlib
+import sys
+from pathlib import Path
+
+
+def main(arguments):
+    """Run the job that `arguments` (a list of strings) name; return the exit code."""
+    from . import job_file, job_run
+    from .errors import UserError
+
+    parser = argparse.ArgumentParser(prog="supple", description="Pose a mesh from a job file.")
+    parser.add_argument("job", type=Path, help="the job file (TOML)")
+    parser.add_argument(
+        "--out", type=Path, help="folder for relative output paths (default: the job file's)"
+    )
+    options = parser.parse_args(arguments)
+    try:
+        job_run.run(job_file.read(options.job, options.out))
+    except UserError as error:
+        print(f"Supple: {error}", file=sys.stderr, flush=True)
+        return 1
+    return 0
+
+
+def _package():
+    """Return the name of the add-on's package, registered in this process."""
+    import addon_utils
+
+    for module in addon_utils.modules():
+        name = module.__name__
+        if name == "supple_blender" or (name.startswith("bl_ext.") and name.endswith(".supple")):
+            if not addon_utils.check(name)[1]:
+                addon_utils.enable(name, default_set=False)
+            return name
+    folder = Path(__file__).resolve().parent
+    sys.path.insert(0, str(folder.parent))
+    importlib.import_module(folder.name).register()
+    return folder.name
+
+
+def _run_as_script():
+    arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    code = importlib.import_module(f"{_package()}.job").main(arguments)
+    if code:
+        sys.exit(code)
+
+
+if __name__ == "__main__":
+    _run_as_script()

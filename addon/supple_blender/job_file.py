@@ -1,0 +1,263 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reading and checking a job file (TOML). Every message names the file and the key."""
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .errors import UserError
+
+ENGINES = {"cycles": "CYCLES", "workbench": "BLENDER_WORKBENCH"}
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where the mesh comes from: a mesh file, or an object of a .blend (None: the open one)."""
+
+    mesh: Path | None
+    up: str
+    groups: Path | None
+    blend: Path | None
+    object: str
+
+
+@dataclass(frozen=True)
+class Move:
+    """What a vertex group does: `matrix` is a world motion (4, 4) or None if the group is held.
+
+    about_centroid: the matrix acts about the centre of the group instead of the world's origin.
+    """
+
+    group: str
+    matrix: np.ndarray | None
+    about_centroid: bool
+
+
+@dataclass(frozen=True)
+class Render:
+    """Pictures from one fixed camera: before and after the pose."""
+
+    before: Path | None
+    after: Path | None
+    engine: str
+    size: tuple
+    samples: int
+
+
+@dataclass(frozen=True)
+class Job:
+    """A checked job file."""
+
+    path: Path
+    source: Source
+    moves: list
+    mode: str
+    network: bool
+    key: str
+    overwrite: bool
+    blend: Path | None
+    report: Path | None
+    render: Render | None
+
+
+class _Table:
+    """A TOML table whose keys are taken one by one; what is left over at the end is an error."""
+
+    def __init__(self, data, file, where):
+        self._data, self._file, self._where = dict(data), file, where
+        self._known = []
+
+    def error(self, key, message):
+        return UserError(f"{self._file}: {self._where}{key}: {message}")
+
+    def take(self, key, kind, default=None, *, required=False):
+        """Return the value of `key`, checked to be a `kind`, which is a key of _NAMES."""
+        self._known.append(key)
+        if key not in self._data:
+            if required:
+                raise self.error(key, "missing; it must be given")
+            return default
+        value = self._data.pop(key)
+        if kind is float and type(value) is int:
+            value = float(value)
+        if type(value) is not kind:
+            raise self.error(key, f"must be a {_NAMES[kind]}, not {value!r}")
+        return value
+
+    def table(self, key, *, required=False):
+        """Return the table `key` as a _Table, or None."""
+        data = self.take(key, dict, required=required)
+        return None if data is None else _Table(data, self._file, f"{self._where}{key}.")
+
+    def choice(self, key, options, default):
+        value = self.take(key, str, default)
+        if value not in options:
+            raise self.error(key, f"must be one of {', '.join(options)}, not '{value}'")
+        return value
+
+    def path(self, key, folder, *, required=False):
+        """Return a path, taken from `folder` if it is relative, or None."""
+        value = self.take(key, str, required=required)
+        return None if value is None else folder / value
+
+    def numbers(self, key, shape):
+        """Return an array of finite numbers of this shape, or None."""
+        value = self.take(key, list)
+        if value is None:
+            return None
+        text = " x ".join(map(str, shape))
+        try:
+            array = np.array(value, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise self.error(key, f"must be {text} numbers") from None
+        if array.shape != shape or not np.isfinite(array).all():
+            raise self.error(key, f"must be {text} finite numbers")
+        return array
+
+    def end(self):
+        for key in self._data:
+            raise self.error(key, f"unknown; the keys here are {', '.join(self._known)}")
+
+
+_NAMES = {
+    str: "text",
+    bool: "true or false",
+    int: "whole number",
+    float: "number",
+    list: "list",
+    dict: "table",
+}
+
+
+def _source(table, folder):
+    if table is None:
+        return Source(mesh=None, up="Y", groups=None, blend=None, object="")
+    source = Source(
+        mesh=table.path("mesh", folder),
+        up=table.choice("up", ("Y", "Z"), "Y"),
+        groups=table.path("groups", folder),
+        blend=table.path("blend", folder),
+        object=table.take("object", str, ""),
+    )
+    if source.mesh and (source.blend or source.object):
+        raise table.error("mesh", "give either mesh, or blend and object, not both")
+    table.end()
+    for key in ("mesh", "groups", "blend"):
+        path = getattr(source, key)
+        if path and not path.is_file():
+            raise table.error(key, f"there is no file {path}")
+    return source
+
+
+def _rotation(table):
+    """Return the (3, 3) rotation of a table {axis, degrees}."""
+    axis = table.numbers("axis", (3,))
+    degrees = table.take("degrees", float, required=True)
+    table.end()
+    if axis is None or not np.linalg.norm(axis) > 0:
+        raise table.error("axis", "must be 3 numbers that are not all 0")
+    x, y, z = axis / np.linalg.norm(axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    angle = np.radians(degrees)
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def _move(table):
+    group = table.take("group", str, required=True)
+    held = table.take("held", bool, False)
+    matrix = table.numbers("matrix", (4, 4))
+    translate = table.numbers("translate", (3,))
+    rotate = table.table("rotate")
+    table.end()
+    moved = [matrix is not None, translate is not None or rotate is not None]
+    if held + sum(moved) != 1:
+        raise table.error(
+            "group", f"'{group}' needs one of: held = true, matrix, translate and/or rotate"
+        )
+    if held:
+        return Move(group, None, about_centroid=False)
+    if matrix is None:
+        motion = np.eye(4)
+        motion[:3, :3] = np.eye(3) if rotate is None else _rotation(rotate)
+        motion[:3, 3] = 0 if translate is None else translate
+        return Move(group, motion, about_centroid=True)
+    if not np.array_equal(matrix[3], [0, 0, 0, 1]):
+        raise table.error("matrix", "its last row must be 0, 0, 0, 1")
+    if abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
+        raise table.error("matrix", f"flattens group '{group}' (determinant 0); check its numbers")
+    return Move(group, matrix, about_centroid=False)
+
+
+def _moves(top, file):
+    tables = top.take("handles", list, required=True)
+    moves = []
+    for index, data in enumerate(tables):
+        where = f"handles[{index}]"
+        if not isinstance(data, dict):
+            raise UserError(f"{file}: {where}: must be a table ([[handles]])")
+        moves.append(_move(_Table(data, file, f"{where}.")))
+    names = [move.group for move in moves]
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            raise UserError(f"{file}: handles[{index}].group: '{name}' is there twice")
+    if not moves:
+        raise top.error("handles", "is empty; name at least one group")
+    return moves
+
+
+def _render(table, folder):
+    if table is None:
+        return None
+    size = table.take("size", list, [640, 640])
+    if len(size) != 2 or not all(type(pixels) is int and 16 <= pixels <= 8192 for pixels in size):
+        raise table.error("size", "must be [width, height] in pixels, 16 to 8192")
+    samples = table.take("samples", int, 16)
+    if not 1 <= samples <= 4096:
+        raise table.error("samples", "must be 1 to 4096")
+    render = Render(
+        before=table.path("before", folder),
+        after=table.path("after", folder),
+        engine=ENGINES[table.choice("engine", tuple(ENGINES), "cycles")],
+        size=tuple(size),
+        samples=samples,
+    )
+    table.end()
+    return render
+
+
+def read(path, out=None):
+    """Return the Job in TOML file `path`. Raises UserError.
+
+    Input paths are relative to the file's folder, output paths to `out` (None: the same folder).
+    """
+    path = Path(path).absolute()
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UserError(f"{path}: can't be read: {error.strerror}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise UserError(f"{path}: not a TOML file: {error}") from error
+    folder = path.parent
+    out = folder if out is None else Path(out).absolute()
+    top = _Table(data, path, "")
+    options = top.table("options") or _Table({}, path, "options.")
+    output = top.table("output", required=True)
+    job = Job(
+        path=path,
+        source=_source(top.table("input"), folder),
+        moves=_moves(top, path),
+        mode=options.choice("mode", ("natural", "stiff"), "natural"),
+        network=options.take("network", bool, True),
+        key=output.take("shape_key", str, required=True),
+        overwrite=output.take("overwrite", bool, False),
+        blend=output.path("blend", out, required=True),
+        report=output.path("report", out),
+        render=_render(top.table("render"), out),
+    )
+    for table in (options, output, top):
+        table.end()
+    if job.blend.suffix != ".blend":
+        raise output.error("blend", f"must end in .blend, not '{job.blend.name}'")
+    return job

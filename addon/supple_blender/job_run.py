@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Running a job: open, pose, bake, save. Nothing is left behind by a job that fails."""
+
+import json
+import os
+import time
+from contextlib import contextmanager
+
+import bpy
+import numpy as np
+
+from . import (
+    VERSION,
+    compat,
+    groups,
+    handles,
+    job_render,
+    mesh_data,
+    native,
+    pose,
+    shape_keys,
+    space,
+)
+from .errors import UserError
+from .stages import Stages
+
+
+def _say(text):
+    print(f"Supple: {text}", flush=True)
+
+
+def _import(source, file):
+    bpy.ops.wm.read_homefile(use_empty=True)
+    if source.mesh.suffix.lower() != ".obj":
+        raise UserError(f"{file}: input.mesh: must be a .obj file, not '{source.mesh.name}'")
+    try:
+        compat.import_obj(source.mesh, source.up)
+    except RuntimeError as error:
+        raise UserError(f"{file}: input.mesh: {error}") from error
+    meshes = [obj for obj in bpy.data.objects if obj.type == "MESH"]
+    if len(meshes) != 1:
+        raise UserError(
+            f"{file}: input.mesh: {source.mesh} gives {len(meshes)} meshes; it must hold one"
+        )
+    bpy.context.view_layer.objects.active = meshes[0]
+    return meshes[0]
+
+
+def _find(source, file):
+    if source.blend:
+        try:
+            bpy.ops.wm.open_mainfile(filepath=str(source.blend), load_ui=False)
+        except RuntimeError as error:
+            raise UserError(f"{file}: input.blend: {error}") from error
+    if not source.object:
+        return bpy.context.view_layer.objects.active
+    obj = bpy.context.scene.objects.get(source.object)
+    if obj is None:
+        raise UserError(
+            f"{file}: input.object: there is no object '{source.object}' in the scene "
+            f"'{bpy.context.scene.name}'"
+        )
+    return obj
+
+
+def _add_groups(obj, path, file):
+    """Add the vertex groups of a JSON file {name: [vertex, ...]}."""
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise UserError(f"{file}: input.groups: {path} is not JSON: {error}") from error
+    if not isinstance(data, dict):
+        raise UserError(f"{file}: input.groups: {path} must hold {{name: [vertex, ...]}}")
+    count = len(obj.data.vertices)
+    for name, vertices in data.items():
+        if not isinstance(vertices, list) or not all(type(vertex) is int for vertex in vertices):
+            raise UserError(f"{file}: input.groups: '{name}' in {path} must be a list of integers")
+        outside = [vertex for vertex in vertices if not 0 <= vertex < count]
+        if outside:
+            raise UserError(
+                f"{file}: input.groups: '{name}' in {path} has vertex {outside[0]}, but "
+                f"{obj.name} has vertices 0 to {count - 1}"
+            )
+        if name in obj.vertex_groups:
+            raise UserError(f"{file}: input.groups: {obj.name} has a group '{name}' already")
+        obj.vertex_groups.new(name=name).add(vertices, 1.0, "REPLACE")
+
+
+def _motion(move, vertices, rest, world):
+    if move.matrix is None:
+        return handles.Motion(move.group, vertices, None)
+    motion = move.matrix
+    if move.about_centroid:
+        centre = space.to_world_points(world, rest.positions[vertices]).mean(axis=0)
+        to_centre = np.eye(4)
+        to_centre[:3, 3] = -centre
+        motion = np.linalg.inv(to_centre) @ motion @ to_centre
+    return handles.Motion(move.group, vertices, space.to_local_matrix(world, motion))
+
+
+def _pose(job, obj):
+    world = handles.world_matrix(bpy.context, obj)
+    rest = mesh_data.collect(obj, world)
+    found = groups.members(obj, [move.group for move in job.moves])
+    groups.require_members(obj.name, found)
+    motions = [_motion(move, found[move.group], rest, world) for move in job.moves]
+    pose_input = pose.PoseInput(rest=rest, motions=motions, mode=job.mode, network=job.network)
+    return rest, pose.solve(pose_input, Stages())
+
+
+@contextmanager
+def _all_or_nothing(targets):
+    """Yield {target: path to write to}; on success they take the targets' places, else they go."""
+    partial = {path: path.with_name(f".partial-{os.getpid()}-{path.name}") for path in targets}
+    try:
+        for path in targets:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        yield partial
+        for path, written in partial.items():
+            os.replace(written, path)
+    except OSError as error:
+        raise UserError(f"{error.filename}: can't be written: {error.strerror}") from error
+    finally:
+        for written in partial.values():
+            written.unlink(missing_ok=True)
+
+
+def _save(path):
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, check_existing=False)
+    except RuntimeError as error:
+        raise UserError(f"{path}: can't be saved: {error}") from error
+
+
+def _report(job, rest, result, seconds):
+    return {
+        "object": rest.name,
+        "vertices": len(rest.positions),
+        "faces": len(rest.triangles),
+        "handles": {m.group: "held" if m.matrix is None else "moved" for m in job.moves},
+        "mode": job.mode,
+        "network": job.network,
+        "shape_key": job.key,
+        "notes": result.notes,
+        "figures": result.report,
+        "seconds": seconds,
+        "supple": native.supple().__version__,
+        "addon": ".".join(map(str, VERSION)),
+        "blender": bpy.app.version_string,
+    }
+
+
+def _plain(value):
+    """Return a NumPy scalar or array as what JSON knows."""
+    return value.tolist()
+
+
+def run(job):
+    """Run a job_file.Job. Raises UserError; then nothing was written."""
+    native.supple()
+    start = time.perf_counter()
+    file = job.path
+    obj = _import(job.source, file) if job.source.mesh else _find(job.source, file)
+    mesh_data.require_writable(obj)
+    if job.source.groups:
+        _add_groups(obj, job.source.groups, file)
+    shape_keys.require_free(obj, job.key, job.overwrite)
+    _say(f"{obj.name}: {len(obj.data.vertices):,} vertices, {len(job.moves)} handles")
+    rest, result = _pose(job, obj)
+    seconds = time.perf_counter() - start
+    shape_keys.write(obj, job.key, result.positions)
+    for note in result.notes:
+        _say(f"{obj.name}: {note}")
+    render = job.render
+    pictures = [path for path in (render.before, render.after) if path] if render else []
+    targets = [job.blend, *([job.report] if job.report else []), *pictures]
+    with _all_or_nothing(targets) as partial:
+        _save(partial[job.blend])
+        if pictures:
+            job_render.before_and_after(obj, job.key, render, partial)
+        if job.report:
+            report = _report(job, rest, result, seconds)
+            text = json.dumps(report, indent=2, default=_plain)
+            partial[job.report].write_text(text + "\n", encoding="utf-8")
+    for path in targets:
+        _say(f"wrote {path}")
