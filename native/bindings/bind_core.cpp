@@ -5,29 +5,30 @@
 namespace supple::bindings {
 
 void bind_core(py::module_& module) {
-  // Error codes reach Python as SuppleError(code, message); the package turns them into its classes.
-  static py::handle native_error =
-      py::exception<Error>(module, "NativeError", PyExc_ValueError).release();
+  // Native errors become the package's own classes, which live in Python.
   py::register_exception_translator([](std::exception_ptr pointer) {
     try {
       if (pointer) {
         std::rethrow_exception(pointer);
       }
     } catch (const Error& error) {
-      const py::tuple arguments = py::make_tuple(to_string(error.code()), error.what());
-      PyErr_SetObject(native_error.ptr(), arguments.ptr());
+      const py::object made = py::module_::import("supple.errors")
+                                  .attr("from_native")(to_string(error.code()), error.what());
+      PyErr_SetObject(py::type::of(made).ptr(), made.ptr());
     }
   });
 
-  py::class_<Progress>(module, "Progress",
-                       "Progress and cancellation of one long call; every member may be used from "
-                       "any thread.")
+  py::class_<Progress>(
+      module, "Progress",
+      "Progress and cancellation of one long call.\n\n"
+      "Pass a new one as `progress=` and watch it from another thread; every member "
+      "may be used from any thread.")
       .def(py::init<>())
       .def_property_readonly("fraction", &Progress::fraction, "Done part of the call, 0 to 1.")
       .def_property_readonly("stage", &Progress::stage, "What is being done, in words.")
       .def_property_readonly("seconds_left", &Progress::seconds_left,
                              "Estimated seconds left; None before 2% is done.")
-      .def_property_readonly("cancelled", &Progress::cancelled)
+      .def_property_readonly("cancelled", &Progress::cancelled, "Whether cancel was called.")
       .def("cancel", &Progress::cancel, "Ask the call to stop; it raises Cancelled soon after.");
 }
 

@@ -15,11 +15,10 @@ py::dict train(const std::vector<TrainingPair>& pairs, const TrainOptions& optio
   Tensors initial, final;
   {
     const py::gil_scoped_release release;
-    Trainer<Scalar> trainer(pairs, options,
-                            range(progress).stage("preparing pairs", 0.0, 0.2));
+    Trainer<Scalar> trainer(pairs, options, range(progress).stage("preparing pairs", 0.0, 0.2));
     initial = trainer.network().tensors();
-    const int total = max_steps > 0 ? std::min(max_steps, trainer.total_steps())
-                                    : trainer.total_steps();
+    const int total =
+        max_steps > 0 ? std::min(max_steps, trainer.total_steps()) : trainer.total_steps();
     const ProgressRange training = range(progress).stage("training", 0.2, 1.0);
     for (int i = 0; i < total; ++i) {
       training.report(static_cast<double>(i) / total);
@@ -67,8 +66,8 @@ void bind_learning(py::module_& module) {
       .def_property_readonly("inputs", [](const Architecture& a) { return a.sizes().inputs; })
       .def_property_readonly("outputs", [](const Architecture& a) { return a.sizes().outputs; });
 
-  py::class_<LocalJacobianNetwork<float>, std::shared_ptr<LocalJacobianNetwork<float>>>(
-      module, "Network")
+  py::class_<LocalJacobianNetwork<float>, std::shared_ptr<LocalJacobianNetwork<float>>>(module,
+                                                                                        "Network")
       .def(py::init<const Architecture&, const Tensors&>(), py::arg("architecture"),
            py::arg("tensors"))
       .def_static(
@@ -92,7 +91,9 @@ void bind_learning(py::module_& module) {
             return std::array<double, 3>{o.weights.jacobian, o.weights.position,
                                          o.weights.integrated};
           },
-          [](TrainOptions& o, const std::array<double, 3>& w) { o.weights = {w[0], w[1], w[2]}; })
+          [](TrainOptions& o, const std::array<double, 3>& w) {
+            o.weights = {w[0], w[1], w[2]};
+          })
       .def_readwrite("samples", &TrainOptions::samples)
       .def_readwrite("fewest_eigenfunctions", &TrainOptions::fewest_eigenfunctions)
       .def_readwrite("most_eigenfunctions", &TrainOptions::most_eigenfunctions)

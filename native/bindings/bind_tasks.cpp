@@ -80,8 +80,8 @@ void bind_tasks(py::module_& module) {
             return std::make_pair(std::move(result.vertices), result.report);
           },
           py::arg("targets"), py::arg("mode") = "natural", py::arg("rounds") = -1,
-          py::arg("passes") = -1, py::arg("network") = true,
-          py::arg("loose_pieces_follow") = true, py::arg("progress") = nullptr, NoGil());
+          py::arg("passes") = -1, py::arg("network") = true, py::arg("loose_pieces_follow") = true,
+          py::arg("progress") = nullptr, NoGil());
 
   module.def(
       "deform",

@@ -61,8 +61,7 @@ Points jacobians_backward(const MatrixField& inverse_rest_frames, const Points& 
                           const Faces& faces, const MatrixField& grad) {
   Points result = Points::Zero(moved.rows(), 3);
   for (Eigen::Index f = 0; f < faces.rows(); ++f) {
-    const Matrix3 grad_frame =
-        matrix_at(inverse_rest_frames, f).transpose() * matrix_at(grad, f);
+    const Matrix3 grad_frame = matrix_at(inverse_rest_frames, f).transpose() * matrix_at(grad, f);
     const Eigen::RowVector3d e1 = moved.row(faces(f, 1)) - moved.row(faces(f, 0));
     const Eigen::RowVector3d e2 = moved.row(faces(f, 2)) - moved.row(faces(f, 0));
     const Eigen::RowVector3d cross = e1.cross(e2);

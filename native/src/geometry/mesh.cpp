@@ -126,8 +126,8 @@ void TriangleMesh::find_surface() {
   surface_vertices_ = (surface_vertices_.rowwise() - centre_) / scale_;
 
   if (!unattached.empty()) {
-    unattached_ =
-        Eigen::Map<Eigen::VectorXi>(unattached.data(), static_cast<Eigen::Index>(unattached.size()));
+    unattached_ = Eigen::Map<Eigen::VectorXi>(unattached.data(),
+                                              static_cast<Eigen::Index>(unattached.size()));
     Points loose(unattached_.size(), 3);
     for (Eigen::Index i = 0; i < unattached_.size(); ++i) {
       loose.row(i) = vertices_.row(unattached_[i]);

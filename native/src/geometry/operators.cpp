@@ -60,9 +60,9 @@ Eigen::VectorXd lumped_mass(const Points& vertices, const Faces& faces) {
       double area = 0.0;
       if (*obtuse >= 0.0) {  // the Voronoi region lies inside the face
         const int a = (k + 1) % 3, b = (k + 2) % 3;
-        area = (s.edge[a].squaredNorm() * s.cotangent[a] +
-                s.edge[b].squaredNorm() * s.cotangent[b]) /
-               8.0;
+        area =
+            (s.edge[a].squaredNorm() * s.cotangent[a] + s.edge[b].squaredNorm() * s.cotangent[b]) /
+            8.0;
       } else {
         area = (obtuse - s.cotangent.begin() == k) ? s.area / 2.0 : s.area / 4.0;
       }

@@ -29,7 +29,8 @@ double decayed_learning_rate(double first, double last, int step, int total) {
 
 template <class Scalar>
 Adam<Scalar>::Adam(const LayerSizes& sizes)
-    : mean_(LayerParameters<Scalar>::zeros(sizes)), square_(LayerParameters<Scalar>::zeros(sizes)) {}
+    : mean_(LayerParameters<Scalar>::zeros(sizes)),
+      square_(LayerParameters<Scalar>::zeros(sizes)) {}
 
 template <class Scalar>
 void Adam<Scalar>::step(const LayerParameters<Scalar>& gradient, double learning_rate,

@@ -116,8 +116,9 @@ RowMatrix<Scalar> read_tensor(const std::map<std::string, RowMatrix<float>>& ten
                               const std::string& name, Eigen::Index rows, Eigen::Index cols) {
   const auto found = tensors.find(name);
   if (found == tensors.end()) {
-    throw Error(ErrorCode::model_file, "The weights have no tensor '" + name +
-                                           "'. They are not a Supple network of this architecture.");
+    throw Error(ErrorCode::model_file,
+                "The weights have no tensor '" + name +
+                    "'. They are not a Supple network of this architecture.");
   }
   const RowMatrix<float>& value = found->second;
   if (value.rows() != rows || value.cols() != cols) {
@@ -280,8 +281,7 @@ MatrixField LocalJacobianNetwork<Scalar>::forward(const NetworkContext<Scalar>& 
     for (Eigen::Index b = 0; b < coefficients.cols(); ++b) {
       correction += coefficients(f, b) * bases[static_cast<size_t>(b)];
     }
-    matrix_at(result, f) =
-        matrix_at(signal.fields.back(), f) + correction.template cast<double>();
+    matrix_at(result, f) = matrix_at(signal.fields.back(), f) + correction.template cast<double>();
   });
   if (trace != nullptr) {
     trace->smooth = std::move(smooth);

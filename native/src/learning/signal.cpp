@@ -19,8 +19,7 @@ SignalKind signal_kind(const std::string& name) {
   if (name == "spectral") {
     return SignalKind::spectral;
   }
-  throw Error(ErrorCode::bad_option,
-              "'" + name + "' is no signal. Use 'rotation' or 'spectral'.");
+  throw Error(ErrorCode::bad_option, "'" + name + "' is no signal. Use 'rotation' or 'spectral'.");
 }
 
 int field_count(SignalKind kind) { return kind == SignalKind::rotation ? 1 : 2; }

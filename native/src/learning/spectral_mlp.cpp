@@ -29,7 +29,8 @@ RowMatrix<Scalar> activation_backward(const RowMatrix<Scalar>& x, const RowMatri
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
     const auto row = x.row(i).array();
     const auto sigmoid = (Scalar(1) / (Scalar(1) + (-row).exp())).eval();
-    result.row(i).array() = grad.row(i).array() * sigmoid * (Scalar(1) + row * (Scalar(1) - sigmoid));
+    result.row(i).array() =
+        grad.row(i).array() * sigmoid * (Scalar(1) + row * (Scalar(1) - sigmoid));
   }
   return result;
 }
@@ -147,13 +148,13 @@ RowMatrix<Scalar> spectral_mlp_backward(const LayerSizes& sizes,
   return {};  // not reached: the loop returns at layer 0
 }
 
-#define SUPPLE_INSTANTIATE(Scalar)                                                              \
-  template struct LayerParameters<Scalar>;                                                      \
-  template RowMatrix<Scalar> spectral_mlp_forward<Scalar>(                                      \
-      const LayerSizes&, const LayerParameters<Scalar>&, const SpectralDomain<Scalar>&,         \
-      const RowMatrix<Scalar>&, SpectralMlpTrace<Scalar>*);                                     \
-  template RowMatrix<Scalar> spectral_mlp_backward<Scalar>(                                     \
-      const LayerSizes&, const LayerParameters<Scalar>&, const SpectralDomain<Scalar>&,         \
+#define SUPPLE_INSTANTIATE(Scalar)                                                      \
+  template struct LayerParameters<Scalar>;                                              \
+  template RowMatrix<Scalar> spectral_mlp_forward<Scalar>(                              \
+      const LayerSizes&, const LayerParameters<Scalar>&, const SpectralDomain<Scalar>&, \
+      const RowMatrix<Scalar>&, SpectralMlpTrace<Scalar>*);                             \
+  template RowMatrix<Scalar> spectral_mlp_backward<Scalar>(                             \
+      const LayerSizes&, const LayerParameters<Scalar>&, const SpectralDomain<Scalar>&, \
       const SpectralMlpTrace<Scalar>&, const RowMatrix<Scalar>&, LayerParameters<Scalar>&);
 SUPPLE_INSTANTIATE(float)
 SUPPLE_INSTANTIATE(double)

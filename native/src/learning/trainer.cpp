@@ -20,9 +20,10 @@ void check(const TrainOptions& options, size_t pairs) {
   }
   if (options.epochs < 1 || options.samples < 0 || options.fewest_eigenfunctions < 1 ||
       options.most_eigenfunctions < options.fewest_eigenfunctions) {
-    throw Error(ErrorCode::bad_option,
-                "Training needs epochs >= 1, samples >= 0 and a range of eigenfunctions that starts "
-                "at 1 or more.");
+    throw Error(
+        ErrorCode::bad_option,
+        "Training needs epochs >= 1, samples >= 0 and a range of eigenfunctions that starts "
+        "at 1 or more.");
   }
   if (options.architecture.configuration == Configuration::paper && options.samples != 0) {
     throw Error(ErrorCode::bad_option,
@@ -34,8 +35,7 @@ TriangleMesh checked(const Points& vertices, const Faces& faces, int pair, const
   try {
     return TriangleMesh(vertices, faces);
   } catch (const Error& error) {
-    throw Error(error.code(),
-                "Pair " + std::to_string(pair) + ", " + side + ": " + error.what());
+    throw Error(error.code(), "Pair " + std::to_string(pair) + ", " + side + ": " + error.what());
   }
 }
 
@@ -139,8 +139,7 @@ void Trainer<Scalar>::normalise_inputs() {
     count += static_cast<double>(raw.rows());
   }
   const Eigen::RowVectorXd mean = sum / count;
-  const Eigen::RowVectorXd variance =
-      (squares / count - mean.cwiseProduct(mean)).cwiseMax(0.0);
+  const Eigen::RowVectorXd variance = (squares / count - mean.cwiseProduct(mean)).cwiseMax(0.0);
   // An input that hardly varies in training must not be blown up elsewhere.
   constexpr double kFloor = 1e-3;
   const Row scale = (variance.cwiseSqrt().array() + kFloor).inverse().template cast<Scalar>();
@@ -158,8 +157,8 @@ TrainStep Trainer<Scalar>::step() {
   TrainStep result;
   result.step = next_;
   result.pair = order_[next_ % count];
-  result.learning_rate = decayed_learning_rate(
-      options_.first_learning_rate, options_.last_learning_rate, next_, total_steps());
+  result.learning_rate = decayed_learning_rate(options_.first_learning_rate,
+                                               options_.last_learning_rate, next_, total_steps());
   const Example& example = *examples_[result.pair];
   if (options_.architecture.signal == SignalKind::spectral) {
     const int range = options_.most_eigenfunctions - options_.fewest_eigenfunctions + 1;

@@ -73,8 +73,8 @@ SpectralDomain<Scalar> sampled_domain(const Eigenbasis& basis, Eigen::Index coun
   }
   const Eigen::MatrixXd weighted = weight.asDiagonal() * functions;
   Eigen::MatrixXd gram = functions.transpose() * weighted;
-  // The mass of a tiny separate piece can leave the Gram matrix near singular; this keeps it solvable
-  // without moving a well-conditioned one.
+  // The mass of a tiny separate piece can leave the Gram matrix near singular; this keeps it
+  // solvable without moving a well-conditioned one.
   gram.diagonal().array() += 1e-10;
   SpectralDomain<Scalar> domain;
   domain.functions = functions.cast<Scalar>();

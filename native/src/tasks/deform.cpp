@@ -22,9 +22,10 @@ Points deform(const PreparedMesh& prepared, const Points& target, int count,
   }
   const TriangleMesh target_mesh(target, mesh.faces());
   if (target_mesh.mesh_vertex() != mesh.mesh_vertex()) {
-    throw Error(ErrorCode::wrong_shape,
-                "The target has other faces without area than the source, so they cannot be compared "
-                "in eigenfunctions.");
+    throw Error(
+        ErrorCode::wrong_shape,
+        "The target has other faces without area than the source, so they cannot be compared "
+        "in eigenfunctions.");
   }
   const SurfaceOperators target_operators(target_mesh);
   const Eigenbasis target_basis =
@@ -37,9 +38,8 @@ Points deform(const PreparedMesh& prepared, const Points& target, int count,
   const Points coarse = spectral_target(prepared.basis, target_basis, truth, cut);
   const Signal signal = spectral_signal(source, prepared.basis, coarse, cut);
   const MatrixField predicted =
-      network == nullptr
-          ? signal.fields.front()
-          : network->forward(*prepared.context_for(network->architecture()), signal);
+      network == nullptr ? signal.fields.front()
+                         : network->forward(*prepared.context_for(network->architecture()), signal);
   const FreePoisson poisson(source.laplacian, source.mass, source.component,
                             source.component_count);
   const Points centred = poisson.solve(source.divergence_of(predicted));

@@ -52,8 +52,9 @@ Editor::Editor(std::shared_ptr<const PreparedMesh> prepared, std::vector<Handle>
   check_handles(handles_, mesh.vertices().rows());
   if (network_ != nullptr) {
     if (network_->architecture().signal != SignalKind::rotation) {
-      throw Error(ErrorCode::bad_option,
-                  "This network takes the spectral signal. Editing needs one trained on rotations.");
+      throw Error(
+          ErrorCode::bad_option,
+          "This network takes the spectral signal. Editing needs one trained on rotations.");
     }
     context_ = prepared_->context_for(network_->architecture());
   }
@@ -76,8 +77,8 @@ Editor::Editor(std::shared_ptr<const PreparedMesh> prepared, std::vector<Handle>
   }
   handle_rows_ = static_cast<Eigen::Index>(held.size());
 
-  // Loose pieces are held in the solves and placed afterwards; their anchors are the nearest points of
-  // pieces with handles.
+  // Loose pieces are held in the solves and placed afterwards; their anchors are the nearest points
+  // of pieces with handles.
   anchor_.setConstant(operators.component_count, -1);
   std::vector<int> firm;
   for (int i = 0; i < operators.component.size(); ++i) {
@@ -96,8 +97,7 @@ Editor::Editor(std::shared_ptr<const PreparedMesh> prepared, std::vector<Handle>
     for (Eigen::Index i = 0; i < loose_points.rows(); ++i) {
       loose_points.row(i) = operators.vertices.row(held[static_cast<size_t>(handle_rows_ + i)]);
     }
-    const NearestPoints::Result nearest =
-        NearestPoints(std::move(firm_points)).query(loose_points);
+    const NearestPoints::Result nearest = NearestPoints(std::move(firm_points)).query(loose_points);
     Eigen::VectorXd best =
         Eigen::VectorXd::Constant(operators.component_count, std::numeric_limits<double>::max());
     for (Eigen::Index i = 0; i < loose_points.rows(); ++i) {
@@ -149,8 +149,8 @@ Points Editor::moved_as_one(const std::vector<HandleTarget>& targets, const Poin
   for (Eigen::Index i = 0; i < handle_rows_; ++i) {
     correlation += (rest.row(held_[i]) - from).transpose() * (held.row(i) - to);
   }
-  // A handle that knows its rotation counts like three more points at a tenth of the surface's size:
-  // enough to decide where the points alone leave a turn open (one vertex, a straight line).
+  // A handle that knows its rotation counts like three more points at a tenth of the surface's
+  // size: enough to decide where the points alone leave a turn open (one vertex, a straight line).
   constexpr double kRadius = 0.1;
   for (size_t h = 0; h < handles_.size(); ++h) {
     if (!targets[h].positions) {
@@ -187,9 +187,9 @@ void Editor::follow_loose_pieces(Points& moved, const MatrixField& vertex_jacobi
   }
   for (Eigen::Index i = handle_rows_; i < held_.size(); ++i) {
     const int vertex = held_[i], piece = operators.component[vertex], anchor = anchor_[piece];
-    moved.row(vertex) = moved.row(anchor) +
-                        (operators.vertices.row(vertex) - operators.vertices.row(anchor)) *
-                            turn[static_cast<size_t>(piece)];
+    moved.row(vertex) =
+        moved.row(anchor) + (operators.vertices.row(vertex) - operators.vertices.row(anchor)) *
+                                turn[static_cast<size_t>(piece)];
   }
 }
 

@@ -18,8 +18,8 @@ void check_handles(const std::vector<Handle>& handles, Eigen::Index vertex_count
   for (size_t h = 0; h < handles.size(); ++h) {
     const Handle& handle = handles[h];
     if (handle.vertices.size() == 0) {
-      throw Error(ErrorCode::empty_handle, "Handle '" + handle.name +
-                                               "' has no vertices. Give it some or remove it.");
+      throw Error(ErrorCode::empty_handle,
+                  "Handle '" + handle.name + "' has no vertices. Give it some or remove it.");
     }
     for (const int vertex : handle.vertices) {
       if (vertex < 0 || vertex >= vertex_count) {
@@ -58,19 +58,22 @@ void check_targets(const std::vector<Handle>& handles, const std::vector<HandleT
     if (targets[h].matrix) {
       const Eigen::Matrix4d& matrix = *targets[h].matrix;
       if (!matrix.allFinite()) {
-        throw Error(ErrorCode::not_finite, name + " has a matrix with numbers that are not finite.");
+        throw Error(ErrorCode::not_finite,
+                    name + " has a matrix with numbers that are not finite.");
       }
       const Eigen::Matrix3d linear = matrix.topLeftCorner<3, 3>();
       const double size = linear.norm();
       if (!(std::abs(linear.determinant()) > 1e-12 * size * size * size)) {
         throw Error(ErrorCode::singular_matrix,
-                    name + " has a matrix without an inverse (a scale of 0?). Give every axis a "
-                           "scale other than 0.");
+                    name +
+                        " has a matrix without an inverse (a scale of 0?). Give every axis a "
+                        "scale other than 0.");
       }
       if (!matrix.row(3).isApprox(Eigen::RowVector4d(0, 0, 0, 1), 1e-9)) {
         throw Error(ErrorCode::bad_option,
-                    name + " has a matrix whose last row is not 0 0 0 1. Give an affine matrix for "
-                           "column vectors, with the translation in the last column.");
+                    name +
+                        " has a matrix whose last row is not 0 0 0 1. Give an affine matrix for "
+                        "column vectors, with the translation in the last column.");
       }
     }
     if (targets[h].positions) {

@@ -11,9 +11,9 @@ namespace {
 Eigenbasis prepare_basis(const SurfaceOperators& operators, const PrepareOptions& options,
                          const ProgressRange& progress) {
   if (options.samples < 0 || options.eigenfunctions < 1) {
-    throw Error(ErrorCode::bad_option,
-                "Preparing needs at least 1 eigenfunction (not " +
-                    std::to_string(options.eigenfunctions) + ") and 0 or more samples.");
+    throw Error(ErrorCode::bad_option, "Preparing needs at least 1 eigenfunction (not " +
+                                           std::to_string(options.eigenfunctions) +
+                                           ") and 0 or more samples.");
   }
   // One more than is used: where to cut is read from the gap above.
   return eigenbasis(operators.laplacian, operators.mass, {.count = options.eigenfunctions + 1},

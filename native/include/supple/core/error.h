@@ -8,20 +8,20 @@ namespace supple {
 
 /// What went wrong, for programs; the message is for people.
 enum class ErrorCode {
-  empty_mesh,          ///< no faces, or none with an area
-  wrong_shape,         ///< an array of the wrong size or dimension
-  index_out_of_range,  ///< a face or a handle names a vertex that is not there
-  not_finite,          ///< NaN or infinity in the input
-  empty_handle,        ///< a handle without vertices
-  overlapping_handles, ///< a vertex in two handles
-  no_handles,          ///< nothing holds or moves the mesh
-  singular_matrix,     ///< a handle matrix without an inverse
-  stale_mesh,          ///< the mesh is not the one that was prepared
-  model_file,          ///< weights that are truncated, foreign or of another architecture
-  bad_option,          ///< a setting outside its range
+  empty_mesh,             ///< no faces, or none with an area
+  wrong_shape,            ///< an array of the wrong size or dimension
+  index_out_of_range,     ///< a face or a handle names a vertex that is not there
+  not_finite,             ///< NaN or infinity in the input
+  empty_handle,           ///< a handle without vertices
+  overlapping_handles,    ///< a vertex in two handles
+  no_handles,             ///< nothing holds or moves the mesh
+  singular_matrix,        ///< a handle matrix without an inverse
+  stale_mesh,             ///< the mesh is not the one that was prepared
+  model_file,             ///< weights that are truncated, foreign or of another architecture
+  bad_option,             ///< a setting outside its range
   not_positive_definite,  ///< a factorisation met a matrix it cannot factor
-  no_convergence,      ///< an iteration did not reach its stated residual
-  cancelled,           ///< the caller asked for it
+  no_convergence,         ///< an iteration did not reach its stated residual
+  cancelled,              ///< the caller asked for it
 };
 
 /// The code's name as written above.

@@ -9,8 +9,8 @@
 namespace supple {
 
 /// A symmetric positive semidefinite system A X = B in which some rows of X are given ("held").
-/// The Poisson and biharmonic solves of this library are all of this form. Factored once for a set of
-/// held rows; a solve is two back-substitutions.
+/// The Poisson and biharmonic solves of this library are all of this form. Factored once for a set
+/// of held rows; a solve is two back-substitutions.
 class HeldSystem {
  public:
   /// matrix: n x n, definite once the held rows are taken out. held: distinct indices in [0, n).

@@ -13,8 +13,9 @@ MatrixField face_frames(const Points& vertices, const Faces& faces);
 /// m x 9: inverse of each frame. Needs faces with an area.
 MatrixField inverse_frames(const MatrixField& frames);
 
-/// m x 9 Jacobians J = E1^-1 E2 from a rest mesh's inverse frames to moved n x 3 vertices: rest edges
-/// times J are moved edges, and the rest normal times J is the moved normal. Source: the paper, Eqn 2.
+/// m x 9 Jacobians J = E1^-1 E2 from a rest mesh's inverse frames to moved n x 3 vertices: rest
+/// edges times J are moved edges, and the rest normal times J is the moved normal. Source: the
+/// paper, Eqn 2.
 MatrixField jacobians(const MatrixField& inverse_rest_frames, const Points& moved,
                       const Faces& faces);
 
@@ -24,9 +25,9 @@ Points jacobians_backward(const MatrixField& inverse_rest_frames, const Points& 
                           const Faces& faces, const MatrixField& grad);
 
 /// The closest rotation Q to a 3x3 matrix J in the Frobenius norm, det Q = +1 (J = W Q with W
-/// symmetric: rows are transformed). J may be singular or mirrored: then the closest rotation is still
-/// returned, one of several where it is not unique. Source: Higham 1986 (scaled Newton), SVD where
-/// that does not apply.
+/// symmetric: rows are transformed). J may be singular or mirrored: then the closest rotation is
+/// still returned, one of several where it is not unique. Source: Higham 1986 (scaled Newton), SVD
+/// where that does not apply.
 Matrix3 closest_rotation(const Matrix3& j);
 
 /// m x 9: `closest_rotation` of each row.

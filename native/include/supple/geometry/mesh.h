@@ -18,8 +18,8 @@ struct Note {
 /// A triangle mesh whose input was checked, split into the part that carries differential operators
 /// and the vertices that only follow it.
 ///
-/// Real meshes have faces without area and vertices without faces; neither has a Laplacian. They are
-/// left out of the `surface_*` arrays, and `scatter` gives them positions again.
+/// Real meshes have faces without area and vertices without faces; neither has a Laplacian. They
+/// are left out of the `surface_*` arrays, and `scatter` gives them positions again.
 class TriangleMesh {
  public:
   /// vertices: n x 3, finite, in the caller's units. faces: m x 3, each index in [0, n).
@@ -55,8 +55,8 @@ class TriangleMesh {
   Points to_surface(const Points& points) const;
   Points from_surface(const Points& points) const;
 
-  /// ns x 3 moved surface vertices and ns x 9 vertex Jacobians (V' = V J, rows) to n x 3 vertices in
-  /// the caller's units. An unattached vertex moves with its nearest surface vertex.
+  /// ns x 3 moved surface vertices and ns x 9 vertex Jacobians (V' = V J, rows) to n x 3 vertices
+  /// in the caller's units. An unattached vertex moves with its nearest surface vertex.
   Points scatter(const Points& moved, const MatrixField& vertex_jacobians) const;
 
  private:

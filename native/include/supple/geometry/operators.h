@@ -16,8 +16,8 @@ SparseMatrix cotan_laplacian(const Points& vertices, const Faces& faces);
 /// vertex has a face. Source: Meyer, Desbrun, Schroeder and Barr 2003, section 3.3; the paper's M.
 Eigen::VectorXd lumped_mass(const Points& vertices, const Faces& faces);
 
-/// 3m x n gradient: rows 3f..3f+2 of (G u) are the tangent gradient of the piecewise linear u on face
-/// f, per unit of length.
+/// 3m x n gradient: rows 3f..3f+2 of (G u) are the tangent gradient of the piecewise linear u on
+/// face f, per unit of length.
 SparseMatrix gradient(const Points& vertices, const Faces& faces);
 
 /// n x 3m integrated divergence G^T A, A the face areas; G^T A G = W.

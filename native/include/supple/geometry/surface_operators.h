@@ -16,14 +16,14 @@ struct SurfaceOperators {
   Faces faces;
   Eigen::VectorXi component;
   int component_count = 0;
-  Eigen::VectorXd face_areas;     ///< m
-  MatrixField inverse_frames;     ///< m x 9, E1^-1
-  Points face_normals;            ///< m x 3
-  Points vertex_normals;          ///< n x 3
-  SparseMatrix laplacian;         ///< n x n, W
-  Eigen::VectorXd mass;           ///< n, diagonal of M
-  SparseMatrix divergence;        ///< n x 3m, grad^T A
-  SparseRowMatrix average;        ///< n x m, uniform face -> vertex averaging
+  Eigen::VectorXd face_areas;  ///< m
+  MatrixField inverse_frames;  ///< m x 9, E1^-1
+  Points face_normals;         ///< m x 3
+  Points vertex_normals;       ///< n x 3
+  SparseMatrix laplacian;      ///< n x n, W
+  Eigen::VectorXd mass;        ///< n, diagonal of M
+  SparseMatrix divergence;     ///< n x 3m, grad^T A
+  SparseRowMatrix average;     ///< n x m, uniform face -> vertex averaging
 
   /// m x 9 Jacobians of moved n x 3 vertices.
   MatrixField jacobians_of(const Points& moved) const;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Local Jacobian Network: a coarse signal in, a Jacobian per face out. Source: the paper, section 4.1.
+// Local Jacobian Network: a coarse signal in, a Jacobian per face out. Source: the paper,
+// section 4.1.
 #pragma once
 
 #include <map>
@@ -16,21 +17,28 @@
 namespace supple {
 
 /// How the layers are joined to the signal. Silent points of the paper are decided at
-/// `spectral_mlp_forward` (activation and its order) and `LayerParameters::random` (initial values).
+/// `spectral_mlp_forward` (activation and its order) and `LayerParameters::random` (initial
+/// values).
 enum class Configuration {
   /// The paper, literally: the nine numbers of the signal, averaged to vertices, in; nine numbers a
   /// vertex out, averaged to faces. Sees world coordinates, so turning a mesh changes its answer.
   paper,
-  /// The same layers between invariants and equivariant matrices ("scalars are universal", Villar et al.
-  /// 2021). Let X_i be the signal's fields, L the last of them, Y_is the field i in the first 8, 16, 32,
+  /// The same layers between invariants and equivariant matrices ("scalars are universal", Villar
+  /// et al.
+  /// 2021). Let X_i be the signal's fields, L the last of them, Y_is the field i in the first 8,
+  /// 16, 32,
   /// 64, 128 eigenfunctions, n the rest normal.
-  /// In: for these matrices averaged to vertices, all products <A, B>, all (n A).(n B), det A, and how far
-  /// the point lies from the surface in 8..128 eigenfunctions, along n and in all; shifted and scaled by
+  /// In: for these matrices averaged to vertices, all products <A, B>, all (n A).(n B), det A, and
+  /// how far
+  /// the point lies from the surface in 8..128 eigenfunctions, along n and in all; shifted and
+  /// scaled by
   /// the training set's mean and deviation.
   /// Out: coefficients c_b, projected to the eigenfunctions, of matrices at each face,
-  ///   J = L + sum_b c_b (B_b - L),  B_b from X_i, P X_i, Y_is, P Y_is (P = n^T n; for P, P (X - L)) and
+  ///   J = L + sum_b c_b (B_b - L),  B_b from X_i, P X_i, Y_is, P Y_is (P = n^T n; for P, P (X -
+  ///   L)) and
   ///   Y_s Y_s^T L of the last field.
-  /// All invariants stay and every B_b turns with J, so the answer turns with the meshes exactly; and
+  /// All invariants stay and every B_b turns with J, so the answer turns with the meshes exactly;
+  /// and
   /// where the signal is one rotation, every B_b - L is 0 and J is that rotation.
   equivariant,
 };
@@ -53,8 +61,8 @@ struct Architecture {
 template <class Scalar>
 struct NetworkContext {
   /// samples: number of points the layers are evaluated at; 0 for every vertex (the paper).
-  /// eigenfunctions: at most the basis's; fewer are used where the mesh has fewer, or where the limit
-  /// would cut through a multiple eigenvalue.
+  /// eigenfunctions: at most the basis's; fewer are used where the mesh has fewer, or where the
+  /// limit would cut through a multiple eigenvalue.
   NetworkContext(const SurfaceOperators& operators, const Eigenbasis& basis, int eigenfunctions,
                  Eigen::Index samples);
 
@@ -73,8 +81,8 @@ class LocalJacobianNetwork {
  public:
   using Row = Eigen::Matrix<Scalar, 1, Eigen::Dynamic>;
 
-  /// New weights. The last layer of `equivariant` starts at 1% of the usual size, so that an untrained
-  /// network hardly changes its signal.
+  /// New weights. The last layer of `equivariant` starts at 1% of the usual size, so that an
+  /// untrained network hardly changes its signal.
   LocalJacobianNetwork(const Architecture& architecture, uint64_t seed);
   /// Errors: `model_file` where a tensor is missing, has another shape, or is not finite.
   LocalJacobianNetwork(const Architecture& architecture,
@@ -83,7 +91,8 @@ class LocalJacobianNetwork {
   const Architecture& architecture() const { return architecture_; }
   LayerParameters<Scalar>& parameters() { return parameters_; }
   const LayerParameters<Scalar>& parameters() const { return parameters_; }
-  /// Names and values of every tensor: layer.0.weight, layer.0.bias (1 x c), ..., input.mean, input.scale.
+  /// Names and values of every tensor: layer.0.weight, layer.0.bias (1 x c), ..., input.mean,
+  /// input.scale.
   std::map<std::string, RowMatrix<float>> tensors() const;
   /// input.mean and input.scale (1 x inputs): layers see (x - mean) * scale.
   void set_normalisation(const Row& mean, const Row& scale);

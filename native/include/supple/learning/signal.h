@@ -19,11 +19,11 @@ const char* to_string(SignalKind kind);
 /// Errors: `bad_option` for any other name.
 SignalKind signal_kind(const std::string& name);
 
-/// Fields of 3x3 matrices, m x 9 each. Turning the source by R1 and the target by R2 (rows: v -> v R)
-/// takes every one of them from X to R1^T X R2.
+/// Fields of 3x3 matrices, m x 9 each. Turning the source by R1 and the target by R2 (rows: v -> v
+/// R) takes every one of them from X to R1^T X R2.
 struct Signal {
-  /// `front()` is the coarse Jacobian, the answer without a network; `back()` the one the equivariant
-  /// network corrects. For `rotation` they are the same field.
+  /// `front()` is the coarse Jacobian, the answer without a network; `back()` the one the
+  /// equivariant network corrects. For `rotation` they are the same field.
   std::vector<MatrixField> fields;
 };
 int field_count(SignalKind kind);
@@ -32,9 +32,9 @@ int field_count(SignalKind kind);
 Signal rotation_signal(const MatrixField& suggested);
 
 /// From a source to a coarse target in the same connectivity (n x 3, its coordinates in `count`
-/// eigenfunctions). Fields: the Jacobian E1^-1 E2 of the paper; and the rotation that best takes the
-/// frames of the source, projected to the same eigenfunctions, to those of the coarse target: what is
-/// left of the deformation when both sides have lost their detail.
+/// eigenfunctions). Fields: the Jacobian E1^-1 E2 of the paper; and the rotation that best takes
+/// the frames of the source, projected to the same eigenfunctions, to those of the coarse target:
+/// what is left of the deformation when both sides have lost their detail.
 Signal spectral_signal(const SurfaceOperators& source, const Eigenbasis& basis,
                        const Points& coarse_target, Eigen::Index count);
 

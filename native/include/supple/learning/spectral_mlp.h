@@ -11,8 +11,8 @@
 
 namespace supple {
 
-/// Sizes of the layers. Source: the paper, section 4.6 and Eqn 4: four layers of `width`, each followed
-/// by projection to the eigenfunctions, then two without (`width`, outputs).
+/// Sizes of the layers. Source: the paper, section 4.6 and Eqn 4: four layers of `width`, each
+/// followed by projection to the eigenfunctions, then two without (`width`, outputs).
 struct LayerSizes {
   int inputs = 9;
   int outputs = 9;
@@ -25,7 +25,8 @@ struct LayerSizes {
   bool operator==(const LayerSizes&) const = default;
 };
 
-/// Weights (rows(l) x cols(l)) and biases (cols(l)) of each layer; also the shape of their gradients.
+/// Weights (rows(l) x cols(l)) and biases (cols(l)) of each layer; also the shape of their
+/// gradients.
 template <class Scalar>
 struct LayerParameters {
   std::vector<RowMatrix<Scalar>> weights;
@@ -41,18 +42,18 @@ struct LayerParameters {
 /// What `spectral_mlp_forward` keeps for the backward pass.
 template <class Scalar>
 struct SpectralMlpTrace {
-  RowMatrix<Scalar> input;                      // p x inputs
+  RowMatrix<Scalar> input;                       // p x inputs
   std::vector<RowMatrix<Scalar>> preactivation;  // p x width, before each activation
   std::vector<RowMatrix<Scalar>> spectral;       // k x width, after each projection
-  RowMatrix<Scalar> last;                       // p x width, the last layer's input
+  RowMatrix<Scalar> last;                        // p x width, the last layer's input
 };
 
 /// p x inputs to p x outputs: x -> Proj(a(x W + b)) four times, then a(x W + b), then x W + b.
 ///
-/// The paper does not name the activation a, nor its place. Here a is SiLU, x / (1 + exp(-x)) (smooth,
-/// so that derivatives can be checked), after each linear map and before the projection; the last map
-/// has none. A projected feature is Phi S with k x width coefficients S, so the next linear map is
-/// applied to S: the same numbers as on all p points, at k / p of the cost.
+/// The paper does not name the activation a, nor its place. Here a is SiLU, x / (1 + exp(-x))
+/// (smooth, so that derivatives can be checked), after each linear map and before the projection;
+/// the last map has none. A projected feature is Phi S with k x width coefficients S, so the next
+/// linear map is applied to S: the same numbers as on all p points, at k / p of the cost.
 template <class Scalar>
 RowMatrix<Scalar> spectral_mlp_forward(const LayerSizes& sizes,
                                        const LayerParameters<Scalar>& parameters,
@@ -60,8 +61,8 @@ RowMatrix<Scalar> spectral_mlp_forward(const LayerSizes& sizes,
                                        const RowMatrix<Scalar>& input,
                                        SpectralMlpTrace<Scalar>* trace = nullptr);
 
-/// Adds the gradient with respect to every parameter to `gradient` and returns p x inputs, the one with
-/// respect to the input; `grad_output` is p x outputs, `trace` that of the forward pass.
+/// Adds the gradient with respect to every parameter to `gradient` and returns p x inputs, the one
+/// with respect to the input; `grad_output` is p x outputs, `trace` that of the forward pass.
 template <class Scalar>
 RowMatrix<Scalar> spectral_mlp_backward(const LayerSizes& sizes,
                                         const LayerParameters<Scalar>& parameters,

@@ -43,8 +43,9 @@ struct TrainStep {
   LossValues loss;
 };
 
-/// Supervised training of a Local Jacobian Network: one pair a step, every pair once an epoch in a new
-/// random order, Adam. Same seed and threads: same bytes. Source: the paper, sections 4.2 and 4.6.
+/// Supervised training of a Local Jacobian Network: one pair a step, every pair once an epoch in a
+/// new random order, Adam. Same seed and threads: same bytes. Source: the paper, sections 4.2
+/// and 4.6.
 template <class Scalar>
 class Trainer {
  public:

@@ -21,21 +21,23 @@ struct Eigenbasis {
   RowMatrix<double> expand(const RowMatrix<double>& coefficients) const;
   /// Spectral projection Phi Phi^T M f with the first `count` functions. Source: the paper, Eqn 7.
   RowMatrix<double> project(const RowMatrix<double>& field, Eigen::Index count) const;
-  /// The largest count <= `limit` that does not cut through a (nearly) multiple eigenvalue. Beyond it
-  /// the span would depend on rounding, and a turned mesh would not give the turned result.
+  /// The largest count <= `limit` that does not cut through a (nearly) multiple eigenvalue. Beyond
+  /// it the span would depend on rounding, and a turned mesh would not give the turned result.
   Eigen::Index stable_count(Eigen::Index limit) const;
 };
 
 struct EigenbasisOptions {
-  int count = 128;            ///< eigenfunctions wanted; min(count, n) are returned
-  double residual = 1e-9;     ///< the stated residual
+  int count = 128;  ///< eigenfunctions wanted; min(count, n) are returned
+  /// The stated residual; where rounding alone leaves more (16 eps |M^-1/2 W M^-1/2|_1, slivers),
+  /// that.
+  double residual = 1e-8;
   int max_iterations = 1000;  ///< Lanczos restarts
 };
 
 /// laplacian: n x n cotangent Laplacian; mass: n, positive. Shift-invert Lanczos (Spectra) on the
-/// Cholesky factor, dense below 3 * count vertices. Multiple eigenvalues (several components, symmetric
-/// shapes) are found whole: the number below the largest is checked by Sylvester's law of inertia.
-/// Errors: `no_convergence` with the residual reached; `cancelled`.
+/// Cholesky factor, dense below 3 * count vertices. Multiple eigenvalues (several components,
+/// symmetric shapes) are found whole: the number below the largest is checked by Sylvester's law of
+/// inertia. Errors: `no_convergence` with the residual reached; `cancelled`.
 Eigenbasis eigenbasis(const SparseMatrix& laplacian, const Eigen::VectorXd& mass,
                       const EigenbasisOptions& options, ProgressRange progress = {});
 

@@ -6,9 +6,9 @@
 
 namespace supple {
 
-/// `count` vertex indices, ascending, spread over n x 3 points by farthest-point sampling; all n where
-/// n <= count. Distances equal to 1e-9 are ties and go to the lowest index, so that rounding (a turned
-/// mesh) does not change the choice.
+/// `count` vertex indices, ascending, spread over n x 3 points by farthest-point sampling; all n
+/// where n <= count. Distances equal to 1e-9 are ties and go to the lowest index, so that rounding
+/// (a turned mesh) does not change the choice.
 Eigen::VectorXi farthest_point_samples(const Points& points, Eigen::Index count);
 
 /// Where a network is evaluated, and how its features get to and from the eigenfunctions.

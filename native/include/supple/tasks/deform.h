@@ -9,10 +9,10 @@ namespace supple {
 /// Recovers a pair's deformation from its spectral signal: the target's coordinates in `count`
 /// eigenfunctions in, a detailed target (n x 3, in the caller's units) out. The paper, section 4.2.
 ///
-/// target: n x 3, the same vertices as the prepared mesh. network: nullptr for the answer without one
-/// (the coarse Jacobians through the same Poisson solve). Each component keeps its target's centroid.
-/// Errors: `wrong_shape`; `bad_option` if the network takes another signal; those of `TriangleMesh` for
-/// the target.
+/// target: n x 3, the same vertices as the prepared mesh. network: nullptr for the answer without
+/// one (the coarse Jacobians through the same Poisson solve). Each component keeps its target's
+/// centroid. Errors: `wrong_shape`; `bad_option` if the network takes another signal; those of
+/// `TriangleMesh` for the target.
 Points deform(const PreparedMesh& prepared, const Points& target, int count,
               const LocalJacobianNetwork<float>* network, ProgressRange progress = {});
 

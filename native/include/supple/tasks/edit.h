@@ -34,7 +34,8 @@ enum class EditMode {
 EditMode edit_mode(const std::string& name);
 
 enum class LoosePieces {
-  follow,  ///< a component without a handle moves rigidly with the nearest point of one that has one
+  follow,  ///< a component without a handle moves rigidly with the nearest point of one that has
+           ///< one
   stay,    ///< it stays where it is
 };
 
@@ -63,8 +64,8 @@ struct EditResult {
 class Editor {
  public:
   /// network: nullptr to edit without one (the closest rotations themselves are the Jacobians).
-  /// Errors: `no_handles`, `empty_handle`, `index_out_of_range`, `overlapping_handles`; `bad_option` if
-  /// the network takes another signal. Messages name the handle.
+  /// Errors: `no_handles`, `empty_handle`, `index_out_of_range`, `overlapping_handles`;
+  /// `bad_option` if the network takes another signal. Messages name the handle.
   Editor(std::shared_ptr<const PreparedMesh> prepared, std::vector<Handle> handles,
          std::shared_ptr<const LocalJacobianNetwork<float>> network, ProgressRange progress = {});
 
@@ -88,10 +89,10 @@ class Editor {
   std::vector<Handle> handles_;
   std::shared_ptr<const LocalJacobianNetwork<float>> network_;
   std::shared_ptr<const NetworkContext<float>> context_;
-  Eigen::VectorXi held_;        // surface vertices in the systems' held set: handles, then loose pieces
-  Eigen::VectorXi held_slot_;   // for each handle vertex in order: its place in held_, or -1
+  Eigen::VectorXi held_;  // surface vertices in the systems' held set: handles, then loose pieces
+  Eigen::VectorXi held_slot_;     // for each handle vertex in order: its place in held_, or -1
   Eigen::Index handle_rows_ = 0;  // how many of held_ belong to handles
-  Eigen::VectorXi anchor_;      // per component: surface vertex it follows, -1 if it has a handle
+  Eigen::VectorXi anchor_;        // per component: surface vertex it follows, -1 if it has a handle
   std::unique_ptr<HeldSystem> biharmonic_, poisson_;
 };
 

@@ -18,8 +18,8 @@ struct PrepareOptions {
   int samples = 1024;
 };
 
-/// Everything about a rest mesh that no handle, target or network changes. Built once, then shared by
-/// any number of editors; immutable.
+/// Everything about a rest mesh that no handle, target or network changes. Built once, then shared
+/// by any number of editors; immutable.
 struct PreparedMesh {
   /// Errors: those of `TriangleMesh` and `eigenbasis`; `bad_option`; `cancelled`.
   PreparedMesh(const Points& vertices, const Faces& faces, const PrepareOptions& options = {},
@@ -29,7 +29,8 @@ struct PreparedMesh {
   SurfaceOperators operators;
   Eigenbasis basis;
   NetworkContext<float> sampled;
-  /// The context a network is evaluated with: `paper` needs every vertex and is built when first asked.
+  /// The context a network is evaluated with: `paper` needs every vertex and is built when first
+  /// asked.
   std::shared_ptr<const NetworkContext<float>> context_for(const Architecture& architecture) const;
 };
 

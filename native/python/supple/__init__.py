@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Supple: detail-preserving deformation of triangle meshes with Local Jacobian Networks.
+
+Arrays in, arrays out: vertices are (n, 3) in the caller's units, faces (m, 3) 0-based triangles,
+matrices (4, 4) for column vectors. Every error is a SuppleError with a code and a readable message.
+Source: Deformation Recovery: Localized Learning for Detail-Preserving Deformations, SIGGRAPH Asia 2024.
+"""
+
+from ._native import Progress, __version__
+from .deforming import deform
+from .editing import Editor, EditResult, Handle, edit
+from .errors import Cancelled, SuppleError
+from .learning import TrainResult, train
+from .mesh import Mesh, Note, PreparedMesh
+from .metrics import face_distortion, flipped_faces, pose_error, symmetric_dirichlet
+from .model import Model, load_model, shipped_models
+
+__all__ = [
+    "Cancelled",
+    "EditResult",
+    "Editor",
+    "Handle",
+    "Mesh",
+    "Model",
+    "Note",
+    "PreparedMesh",
+    "Progress",
+    "SuppleError",
+    "TrainResult",
+    "__version__",
+    "deform",
+    "edit",
+    "face_distortion",
+    "flipped_faces",
+    "load_model",
+    "pose_error",
+    "shipped_models",
+    "symmetric_dirichlet",
+    "train",
+]

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Checked conversion of what callers pass to the arrays the native module takes."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import SuppleError
+
+
+def _array(value: ArrayLike, name: str) -> NDArray:
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise SuppleError("wrong_shape", f"{name} is not a regular array: {error}.") from error
+    if array.dtype.kind not in "fiub":
+        raise SuppleError("wrong_shape", f"{name} holds {array.dtype} values, not numbers.")
+    return array
+
+
+def points(value: ArrayLike, name: str = "vertices") -> NDArray[np.float64]:
+    """(n, 3) float64, C order. Errors: wrong_shape."""
+    array = _array(value, name)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise SuppleError("wrong_shape", f"{name} has shape {array.shape}; it must be (n, 3).")
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def triangles(value: ArrayLike, name: str = "faces") -> NDArray[np.int32]:
+    """(m, 3) int32, C order. Errors: wrong_shape, also for indices that are not whole numbers."""
+    array = _array(value, name)
+    if array.size == 0:
+        return np.zeros((0, 3), dtype=np.int32)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise SuppleError(
+            "wrong_shape",
+            f"{name} has shape {array.shape}; it must be (m, 3): triangles. "
+            "Triangulate larger polygons first.",
+        )
+    return _whole(array, name)
+
+
+def indices(value: ArrayLike, name: str) -> NDArray[np.int32]:
+    """(k,) int32. Errors: wrong_shape."""
+    array = _array(value, name)
+    if array.size == 0:
+        return np.zeros(0, dtype=np.int32)
+    if array.ndim != 1:
+        raise SuppleError("wrong_shape", f"{name} has shape {array.shape}; it must be a list.")
+    return _whole(array, name)
+
+
+def matrix4(value: ArrayLike, name: str) -> NDArray[np.float64]:
+    """(4, 4) float64, column-vector convention. Errors: wrong_shape."""
+    array = _array(value, name)
+    if array.shape != (4, 4):
+        raise SuppleError("wrong_shape", f"{name} has shape {array.shape}; it must be (4, 4).")
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def _whole(array: NDArray, name: str) -> NDArray[np.int32]:
+    limits = np.iinfo(np.int32)
+    if array.dtype.kind == "b" or (
+        array.dtype.kind == "f" and not np.array_equal(array, np.round(array))
+    ):
+        raise SuppleError("wrong_shape", f"{name} holds values that are not whole numbers.")
+    if array.max() > limits.max or array.min() < limits.min:
+        raise SuppleError("index_out_of_range", f"{name} holds indices beyond 2**31.")
+    return np.ascontiguousarray(array, dtype=np.int32)

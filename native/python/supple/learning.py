@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Supervised training, all of it native. Source: the paper, sections 4.2 and 4.6."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _native, arrays
+from .model import Model, from_tensors
+
+
+@dataclass
+class TrainResult:
+    """A trained network and how it got there.
+
+    Attributes:
+        model: the network.
+        steps: one dict a step: step, pair, eigenfunctions, learning_rate, loss, jacobian, position,
+            integrated (the three terms before weighting).
+        initial: the weights before the first step, by name.
+    """
+
+    model: Model
+    steps: list[dict[str, float | int]]
+    initial: dict[str, NDArray[np.float32]]
+
+
+def train(
+    pairs: Sequence[tuple[ArrayLike, ArrayLike, ArrayLike]],
+    *,
+    signal: str,
+    config: str = "equivariant",
+    epochs: int = 50,
+    seed: int = 0,
+    samples: int | None = None,
+    width: int = 256,
+    eigenfunctions: int = 128,
+    learning_rate: tuple[float, float] = (1e-3, 1e-5),
+    loss_weights: tuple[float, float, float] = (1.0, 10.0, 2.0),
+    metadata: dict[str, str] | None = None,
+    max_steps: int | None = None,
+    double: bool = False,
+    callback: Callable[[dict], None] | None = None,
+    progress: _native.Progress | None = None,
+) -> TrainResult:
+    """Train a Local Jacobian Network on pairs in 1:1 correspondence.
+
+    Args:
+        pairs: (source_vertices (n, 3), faces (m, 3), target_vertices (n, 3)) each, any units.
+        signal: "rotation" (closest rotations of the true Jacobians) or "spectral" (the target in 20
+            to 100 eigenfunctions, drawn anew each step).
+        config: "equivariant" or "paper".
+        epochs: every pair once each, in a new random order.
+        seed: of the initial weights and every draw. Same seed and threads: same bytes.
+        samples: points of each mesh the layers are evaluated at, 0 for every vertex; None for 1024
+            ("equivariant") or 0 ("paper").
+        width, eigenfunctions: of the network.
+        learning_rate: first and last; between them the same factor every step.
+        loss_weights: of the Jacobian, position and integrated terms.
+        metadata: added to the model's.
+        max_steps: stop early (the schedule stays that of all epochs).
+        double: train in double precision (for checks).
+        callback: called with each step's dict, in the calling thread.
+        progress: a Progress to watch and cancel.
+
+    Raises:
+        SuppleError: bad_option, wrong_shape, and those of Mesh, naming the pair.
+        Cancelled: if progress was cancelled.
+    """
+    options = _native.TrainOptions()
+    options.architecture = _native.Architecture(config, signal, eigenfunctions, width)
+    options.epochs = epochs
+    options.seed = seed
+    options.samples = (0 if config == "paper" else 1024) if samples is None else samples
+    options.first_learning_rate, options.last_learning_rate = learning_rate
+    options.loss_weights = list(loss_weights)
+    run = _native.train_double if double else _native.train
+    result = run(
+        [
+            _native.TrainingPair(
+                arrays.points(source, f"pair {i}: source"),
+                arrays.triangles(faces, f"pair {i}: faces"),
+                arrays.points(target, f"pair {i}: target"),
+            )
+            for i, (source, faces, target) in enumerate(pairs)
+        ],
+        options,
+        0 if max_steps is None else max_steps,
+        callback,
+        progress,
+    )
+    architecture = {
+        "configuration": config,
+        "signal": signal,
+        "eigenfunctions": str(eigenfunctions),
+        "width": str(width),
+    }
+    return TrainResult(
+        from_tensors(result["tensors"], {**(metadata or {}), **architecture}),
+        result["steps"],
+        {name: np.array(value) for name, value in result["initial"].items()},
+    )

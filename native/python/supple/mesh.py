@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes, checked and prepared."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _native, arrays
+
+
+@dataclass(frozen=True)
+class Note:
+    """Something unusual in a mesh and what was done about it.
+
+    Attributes:
+        code: "degenerate_faces", "unattached_vertices", "boundary", "nonmanifold_edges",
+            "components".
+        count: how many places.
+        message: for people.
+    """
+
+    code: str
+    count: int
+    message: str
+
+
+def _notes(native: object) -> list[Note]:
+    return [Note(note.code, note.count, note.message) for note in native.notes]
+
+
+class Mesh:
+    """A triangle mesh whose input was checked.
+
+    Attributes:
+        vertices: (n, 3) float64, the caller's units.
+        faces: (m, 3) int32, 0-based.
+        notes: what is unusual about it.
+
+    Raises:
+        SuppleError: empty_mesh, wrong_shape, index_out_of_range, not_finite.
+    """
+
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
+        self.vertices: NDArray[np.float64] = arrays.points(vertices)
+        self.faces: NDArray[np.int32] = arrays.triangles(faces)
+        self.notes = _notes(_native.TriangleMesh(self.vertices, self.faces))
+
+
+class PreparedMesh:
+    """Everything about a rest mesh that no handle changes: operators and eigenfunctions.
+
+    Built once, then shared by any number of editors. The native work runs without the GIL.
+
+    Args:
+        vertices: (n, 3), the caller's units.
+        faces: (m, 3), 0-based triangles.
+        eigenfunctions: of the network's spectral projections; fewer where the mesh has fewer.
+        samples: points the network is evaluated at; 0 for every vertex (slower).
+        progress: a Progress to watch and cancel.
+
+    Attributes:
+        vertices, faces: as given, float64 and int32.
+        notes: list of Note.
+        seconds: time it took to prepare.
+        residual: largest relative residual of the eigenfunctions.
+
+    Raises:
+        SuppleError: as Mesh; no_convergence; bad_option.
+        Cancelled: if progress was cancelled.
+    """
+
+    def __init__(
+        self,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        *,
+        eigenfunctions: int = 128,
+        samples: int = 1024,
+        progress: _native.Progress | None = None,
+    ) -> None:
+        start = time.perf_counter()
+        self.vertices: NDArray[np.float64] = arrays.points(vertices)
+        self.faces: NDArray[np.int32] = arrays.triangles(faces)
+        self.native = _native.PreparedMesh(
+            self.vertices, self.faces, eigenfunctions, samples, progress
+        )
+        self.notes = _notes(self.native)
+        self.residual: float = self.native.residual
+        self.seconds = time.perf_counter() - start
+
+    @property
+    def vertex_count(self) -> int:
+        """Number of vertices n."""
+        return len(self.vertices)
+
+    @property
+    def diagonal(self) -> float:
+        """Length of the bounding box's diagonal, in the caller's units."""
+        return self.native.diagonal
