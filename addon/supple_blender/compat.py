@@ -53,11 +53,3 @@ def register_cli_command(name, function):
 def unregister_cli_command(handle):
     """Undo `register_cli_command` for one of the handles it gave."""
     bpy.utils.unregister_cli_command(handle)
-
-
-def import_obj(path, up):
-    """Import a Wavefront OBJ with `up` ('Y' or 'Z') as the axis that points up, order kept."""
-    forward = {"Y": "NEGATIVE_Z", "Z": "Y"}[up]
-    bpy.ops.wm.obj_import(
-        filepath=str(path), forward_axis=forward, up_axis=up, use_split_objects=False
-    )

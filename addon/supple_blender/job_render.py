@@ -73,13 +73,10 @@ def _set_up(scene, render):
 
 
 def _remove(scene):
-    data = [(obj, obj.data) for obj in scene.collection.objects if obj.name.startswith("Supple ")]
-    world = scene.world
+    ours = [obj for obj in scene.collection.objects if obj.name.startswith("Supple ")]
+    blocks = [scene.world, *ours, *(obj.data for obj in ours)]
     bpy.data.scenes.remove(scene)
-    for obj, block in data:
-        bpy.data.objects.remove(obj)
-        (bpy.data.cameras if block.id_type == "CAMERA" else bpy.data.lights).remove(block)
-    bpy.data.worlds.remove(world)
+    bpy.data.batch_remove(blocks)
 
 
 def _shoot(scene, path):

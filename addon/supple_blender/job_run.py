@@ -11,7 +11,6 @@ import numpy as np
 
 from . import (
     VERSION,
-    compat,
     groups,
     handles,
     job_render,
@@ -24,6 +23,9 @@ from . import (
 from .errors import UserError
 from .stages import Stages
 
+# The other axis of an OBJ: bodies with Y up look along Z, as Blender's own default has it.
+FORWARD = {"Y": "NEGATIVE_Z", "Z": "Y"}
+
 
 def _say(text):
     print(f"Supple: {text}", flush=True)
@@ -34,7 +36,9 @@ def _import(source, file):
     if source.mesh.suffix.lower() != ".obj":
         raise UserError(f"{file}: input.mesh: must be a .obj file, not '{source.mesh.name}'")
     try:
-        compat.import_obj(source.mesh, source.up)
+        bpy.ops.wm.obj_import(
+            filepath=str(source.mesh), up_axis=source.up, forward_axis=FORWARD[source.up]
+        )
     except RuntimeError as error:
         raise UserError(f"{file}: input.mesh: {error}") from error
     meshes = [obj for obj in bpy.data.objects if obj.type == "MESH"]
@@ -42,8 +46,22 @@ def _import(source, file):
         raise UserError(
             f"{file}: input.mesh: {source.mesh} gives {len(meshes)} meshes; it must hold one"
         )
-    bpy.context.view_layer.objects.active = meshes[0]
-    return meshes[0]
+    obj = bpy.context.view_layer.objects.active = meshes[0]
+    if source.groups:
+        _require_file_order(obj, source.mesh, file)
+    return obj
+
+
+def _require_file_order(obj, path, file):
+    """Blender's importer drops vertices without faces, which would shift the groups' numbers."""
+    with open(path, "rb") as lines:
+        in_file = sum(line.startswith(b"v ") for line in lines)
+    if in_file != len(obj.data.vertices):
+        raise UserError(
+            f"{file}: input.groups: {path} has {in_file} vertices, but Blender imports only the "
+            f"{len(obj.data.vertices)} that faces use, so the numbers in the groups do not fit. "
+            "Remove the other vertices from the OBJ, or give a .blend with vertex groups."
+        )
 
 
 def _find(source, file):
@@ -114,6 +132,8 @@ def _all_or_nothing(targets):
     partial = {path: path.with_name(f".partial-{os.getpid()}-{path.name}") for path in targets}
     try:
         for path in targets:
+            if path.is_dir():
+                raise UserError(f"{path}: is a folder, so no file of this name can be written")
             path.parent.mkdir(parents=True, exist_ok=True)
         yield partial
         for path, written in partial.items():
