@@ -25,16 +25,24 @@ def make(
     vertices: Annotated[
         tuple[int, int], typer.Option(help="The range of vertex counts.", metavar="LOW HIGH")
     ] = (3500, 6500),
+    other_bodies: Annotated[
+        float, typer.Option(min=0, max=1, help="The share of targets that are another body.")
+    ] = 0.2,
+    small: Annotated[
+        bool, typer.Option("--small", help="float32, compressed: for a file kept in a repository.")
+    ] = False,
     processes: Annotated[int, typer.Option(min=1, help="Processes that make pairs.")] = 2,
     cache: Annotated[Path, typer.Option(help="Where pairs are kept.")] = DEFAULT_CACHE,
 ) -> None:
     """Sample bodies and poses from anny, triangulate each anew, and write them as pairs."""
     try:
-        settings = pair_store.PairSettings(pairs, seed, held_out, vertices)
+        settings = pair_store.PairSettings(
+            pairs, seed, held_out, vertices, other_body_share=other_bodies
+        )
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     made = pairs_with_progress(settings, cache, processes=processes)
-    pair_store.save(out, made, settings)
+    pair_store.save(out, made, settings, small=small)
     counts = [len(source) for source, _, _ in made]
     console.print(f"{out}: {len(made)} pairs of {min(counts)} to {max(counts)} vertices")
 

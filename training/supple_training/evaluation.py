@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How near a network comes to the truth on pairs it has not seen, beside no network at all.
+
+Every figure is a pose error: the area-weighted RMS distance to the true target, divided by the
+square root of the source's area, x100. "no_network" has the identity in the network's place, with
+the same number of rounds, passes and solves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import supple
+from numpy.typing import NDArray
+
+from supple_training.pairs import Pair
+
+HANDLE_COUNTS = (8, 16, 40)
+"""How many handles a pose is edited by."""
+
+EIGENFUNCTIONS = (40, 80)
+"""In how many eigenfunctions the target of the spectral signal is given."""
+
+Row = dict[str, float]
+Rows = dict[str, Row]
+
+
+def farthest_points(points: NDArray[np.float64], count: int) -> NDArray[np.int64]:
+    """(count,) indices of points (n, 3) that are far from each other, starting at the outermost."""
+    distance = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    chosen = [int(distance.argmax())]
+    distance = np.full(len(points), np.inf)
+    while len(chosen) < count:
+        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
+        chosen.append(int(distance.argmax()))
+    return np.array(chosen)
+
+
+def true_handles(pair: Pair, count: int) -> list[supple.Handle]:
+    """`count` small handles, a vertex and its neighbours each, at their true positions."""
+    source, faces, target = pair
+    free = np.ones(len(source), bool)
+    handles = []
+    for number, centre in enumerate(farthest_points(source, count)):
+        patch = np.unique(faces[np.any(faces == centre, axis=1)])
+        patch = patch[free[patch]]
+        free[patch] = False
+        if len(patch):
+            handles.append(supple.Handle(f"handle {number}", patch, positions=target[patch]))
+    return handles
+
+
+def rotation_rows(pairs: list[Pair], model: supple.Model) -> list[Rows]:
+    """For each pair: editing, in mode natural, by the true positions of 8, 16 and 40 handles.
+
+    Pairs of two different bodies are no edits; leave them out.
+    """
+    result = []
+    for pair in pairs:
+        source, faces, target = pair
+        prepared = supple.PreparedMesh(source, faces)
+        rows: Rows = {"network": {}, "no_network": {}}
+        for count in HANDLE_COUNTS:
+            editor = supple.Editor(prepared, true_handles(pair, count), model=model)
+            for name, row in rows.items():
+                posed = editor.solve(mode="natural", network=name == "network").vertices
+                row[f"{count} handles"] = supple.pose_error(source, faces, posed, target)
+        result.append(rows)
+    return result
+
+
+def spectral_rows(pairs: list[Pair], model: supple.Model) -> list[Rows]:
+    """For each pair: the target recovered from its coordinates in 40 and 80 eigenfunctions."""
+    result = []
+    for source, faces, target in pairs:
+        prepared = supple.PreparedMesh(source, faces)
+        rows: Rows = {"network": {}, "no_network": {}}
+        for count in EIGENFUNCTIONS:
+            for name, row in rows.items():
+                recovered = supple.deform(
+                    prepared,
+                    target,
+                    model=model,
+                    eigenfunctions=count,
+                    network=name == "network",
+                )
+                row[f"{count} eigenfunctions"] = supple.pose_error(source, faces, recovered, target)
+        result.append(rows)
+    return result
+
+
+def evaluate(pairs: list[Pair], model: supple.Model) -> dict:
+    """Plain means over the pairs, and each pair's own figures.
+
+    Returns {"rows": {"network": {case: pose error}, "no_network": {...}}, "each": [...]}; the cases
+    are those of the model's signal.
+    """
+    measure: Callable = rotation_rows if model.signal == "rotation" else spectral_rows
+    each = measure(pairs, model)
+    rows = {
+        name: {case: float(np.mean([e[name][case] for e in each])) for case in each[0][name]}
+        for name in each[0]
+    }
+    return {"rows": rows, "each": each, "pairs": len(pairs)}

@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Command: train a network on bodies from anny, all of the training in C++.
+
+python -m supple_training.train rotation --out rotation.safetensors
+python -m supple_training.train spectral --out spectral.safetensors
+
+Beside the weights it writes NAME.metrics.json and NAME.loss.png.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+import time
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import matplotlib
+import numpy as np
+import supple
+import typer
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from supple_training import pairs as pair_store
+from supple_training.console import DEFAULT_CACHE, console, pairs_with_progress
+from supple_training.evaluation import evaluate
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+HELD_OUT_SEED = 1_000_000
+"""Added to the seed for held-out pairs, which also come from bodies of their own."""
+
+
+class Signal(StrEnum):
+    """What a network starts from."""
+
+    spectral = "spectral"
+    rotation = "rotation"
+
+
+class Config(StrEnum):
+    """How its layers are joined to the signal."""
+
+    equivariant = "equivariant"
+    paper = "paper"
+
+
+def pair_settings(signal: str, *, pairs: int, seed: int, held_out: bool) -> pair_store.PairSettings:
+    """The pairs a signal is trained (or measured) on.
+
+    `rotation` is for editing, where the target is always the same body: rotations say nothing of
+    what another body looks like. `spectral` is for matching, where it often is another.
+    """
+    return pair_store.PairSettings(
+        pairs,
+        seed + HELD_OUT_SEED if held_out else seed,
+        held_out,
+        other_body_share=0.2 if signal == "spectral" else 0.0,
+    )
+
+
+def run_training(pairs: list[pair_store.Pair], **options) -> tuple[supple.TrainResult, float]:
+    """`supple.train` under a progress bar; returns its result and the seconds it took.
+
+    Ctrl-C cancels the native run and raises KeyboardInterrupt.
+    """
+    watched = supple.Progress()
+    outcome: dict = {}
+
+    def note(step: dict) -> None:
+        outcome["step"] = step
+
+    def work() -> None:
+        try:
+            outcome["result"] = supple.train(pairs, progress=watched, callback=note, **options)
+        except BaseException as error:  # handed to the main thread, which raises it
+            outcome["error"] = error
+
+    total = options["epochs"] * len(pairs)
+    start = time.perf_counter()
+    worker = threading.Thread(target=work)
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f}%"),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[left]}"),
+        TextColumn("{task.fields[loss]}"),
+        console=console,
+    ) as bar:
+        task = bar.add_task("starting", total=1.0, left="", loss="")
+        worker.start()
+        try:
+            while worker.is_alive():
+                worker.join(0.2)
+                left, step = watched.seconds_left, outcome.get("step")
+                bar.update(
+                    task,
+                    description=watched.stage or "starting",
+                    completed=watched.fraction,
+                    left="" if left is None else f"{left:.0f} s left",
+                    loss=""
+                    if step is None
+                    else f"step {step['step'] + 1}/{total} loss {step['loss']:.4f}",
+                )
+        except KeyboardInterrupt:
+            watched.cancel()
+            worker.join()
+            raise
+    if "error" in outcome:
+        raise outcome["error"]
+    return outcome["result"], time.perf_counter() - start
+
+
+def epoch_means(steps: list[dict], pairs: int) -> dict[str, list[float]]:
+    """The mean of the loss and of its three terms over each epoch."""
+    names = ("loss", "jacobian", "position", "integrated")
+    values = np.array([[step[name] for name in names] for step in steps])
+    means = values[: len(values) // pairs * pairs].reshape(-1, pairs, len(names)).mean(axis=1)
+    return dict(zip(names, means.T.tolist(), strict=True))
+
+
+def plot_losses(means: dict[str, list[float]], title: str, path: Path) -> None:
+    """The loss curve as PNG."""
+    figure, axes = plt.subplots(figsize=(7, 4.2), layout="constrained")
+    for name, values in means.items():
+        axes.plot(np.arange(1, len(values) + 1), values, label=name, lw=2 if name == "loss" else 1)
+    axes.set(xlabel="epoch", ylabel="mean loss", yscale="log", title=title)
+    axes.grid(alpha=0.3)
+    axes.legend()
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def report_table(measured: dict) -> Table:
+    """Pose errors on held-out pairs, the network beside no network."""
+    rows = measured["rows"]
+    table = Table(title=f"Pose error on {measured['pairs']} held-out pairs (lower is better)")
+    table.add_column("")
+    for case in rows["network"]:
+        table.add_column(case, justify="right")
+    for name in ("no_network", "network"):
+        table.add_row(name.replace("_", " "), *(f"{value:.3f}" for value in rows[name].values()))
+    gains = [1 - rows["network"][case] / rows["no_network"][case] for case in rows["network"]]
+    table.add_row("nearer by", *(f"{gain:+.1%}" for gain in gains))
+    return table
+
+
+def main(
+    signal: Annotated[Signal, typer.Argument(help="What the network starts from.")],
+    out: Annotated[Path, typer.Option(help="The .safetensors file to write.")],
+    pairs: Annotated[int, typer.Option(min=1, help="Training pairs, one a step.")] = 60,
+    epochs: Annotated[int, typer.Option(min=1, help="Every pair once each.")] = 50,
+    seed: Annotated[int, typer.Option(min=0, help="Of the pairs, weights and draws.")] = 0,
+    config: Annotated[Config, typer.Option(help="Form of the network.")] = Config.equivariant,
+    held_out: Annotated[int, typer.Option(min=1, help="Pairs to measure on.")] = 12,
+    data: Annotated[
+        Path | None, typer.Option(help="Train on this .npz of pairs instead of new ones.")
+    ] = None,
+    processes: Annotated[int, typer.Option(min=1, help="Processes that make pairs.")] = 2,
+    cache: Annotated[Path, typer.Option(help="Where pairs are kept.")] = DEFAULT_CACHE,
+) -> None:
+    """Train a network, measure it on held-out bodies, write it with its metrics and loss curve."""
+    if out.suffix != ".safetensors":
+        raise typer.BadParameter(f"{out} must end in .safetensors", param_hint="--out")
+    if not out.parent.is_dir():
+        raise typer.BadParameter(f"the folder {out.parent} does not exist", param_hint="--out")
+    settings = pair_settings(signal.value, pairs=pairs, seed=seed, held_out=False)
+    if data is None:
+        training = pairs_with_progress(settings, cache, processes=processes)
+        source = (
+            f"{pairs} pairs of bodies and poses sampled from anny 0.6.2 "
+            f"(code Apache-2.0, MakeHuman assets CC0-1.0), seed {seed}"
+        )
+    else:
+        try:
+            training = pair_store.load(data)
+        except (OSError, ValueError) as error:
+            raise typer.BadParameter(str(error), param_hint="--data") from error
+        source = f"{len(training)} pairs of the file {data.name}"
+    unseen = pairs_with_progress(
+        pair_settings(signal.value, pairs=held_out, seed=seed, held_out=True),
+        cache,
+        processes=processes,
+    )
+
+    metadata = {
+        "title": f"Supple Local Jacobian Network, {signal.value} signal",
+        "training_data": source,
+        "training": f"{epochs} epochs, one pair a step, Adam 1e-3 to 1e-5",
+        "seed": str(seed),
+        "licence": "GPL-3.0-or-later",
+        "version": supple.__version__,
+    }
+    result, seconds = run_training(
+        training,
+        signal=signal.value,
+        config=config.value,
+        epochs=epochs,
+        seed=seed,
+        metadata=metadata,
+    )
+    result.model.save(out)
+    steps = len(result.steps)
+    cores = len(os.sched_getaffinity(0))
+    console.print(
+        f"trained {len(training)} pairs x {epochs} epochs in {seconds / 60:.1f} minutes on {cores} "
+        f"cores, preparation included: {seconds / steps:.3f} s a step"
+    )
+
+    means = epoch_means(result.steps, len(training))
+    plot_losses(means, metadata["title"], out.with_suffix(".loss.png"))
+    with console.status("measuring on held-out pairs"):
+        measured = evaluate(unseen, result.model)
+    report = {
+        "signal": signal.value,
+        "configuration": config.value,
+        "training_seconds": seconds,
+        "seconds_per_step": seconds / steps,
+        "cores": cores,
+        "epoch_loss": means,
+        "held_out": measured,
+        "metadata": result.model.metadata,
+    }
+    out.with_suffix(".metrics.json").write_text(json.dumps(report, indent=1) + "\n")
+    console.print(report_table(measured))
+    console.print(
+        f"wrote {out}, {out.with_suffix('.metrics.json')}, {out.with_suffix('.loss.png')}"
+    )
+
+
+if __name__ == "__main__":
+    typer.run(main)
