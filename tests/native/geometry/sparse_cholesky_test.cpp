@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "supple/geometry/sparse_cholesky.h"
+
+#include <thread>
+#include <vector>
+
+#include "native/support.h"
+#include "supple/geometry/surface_operators.h"
+
+namespace supple {
+namespace {
+
+using Backend = SparseCholesky::Backend;
+
+// W + M of a mesh: definite, with the pattern every solve of the library has.
+SparseMatrix definite(const zoo::Mesh& mesh) {
+  const SurfaceOperators operators{TriangleMesh(mesh.vertices, mesh.faces)};
+  SparseMatrix matrix = operators.laplacian;
+  matrix.diagonal() += operators.mass;
+  return matrix;
+}
+
+SparseMatrix sparse(const Eigen::MatrixXd& dense) { return dense.sparseView(); }
+
+class Cholesky : public ::testing::TestWithParam<Backend> {
+ protected:
+  void SetUp() override {
+    if (!SparseCholesky::available(GetParam())) {
+      GTEST_SKIP() << "this build has no CHOLMOD";
+    }
+  }
+};
+
+TEST_P(Cholesky, Solves) {
+  for (const zoo::Entry& entry : zoo::all()) {
+    const SparseMatrix matrix = definite(entry.mesh);
+    const SparseCholesky factor(matrix, GetParam());
+    EXPECT_EQ(factor.size(), matrix.rows());
+    EXPECT_EQ(factor.backend(), GetParam());
+    const Eigen::MatrixXd rhs = test::noise(matrix.rows(), 4, 1);
+    const Eigen::MatrixXd x = factor.solve(rhs);
+    ASSERT_EQ(x.cols(), 4);
+    // Backward stable: the residual is rounding of |A| |x|.
+    const double size = Eigen::MatrixXd(matrix).norm() * x.norm();
+    EXPECT_LT((matrix * x - rhs).norm(), 1e-13 * size) << entry.name;
+  }
+}
+
+TEST_P(Cholesky, SolvesAHandMadeSystem) {
+  const SparseMatrix matrix = sparse((Eigen::Matrix2d() << 4, 2, 2, 3).finished());
+  const Eigen::MatrixXd x = SparseCholesky(matrix, GetParam()).solve(Eigen::Vector2d(8, 8));
+  EXPECT_NEAR(x(0), 1.0, 1e-15);
+  EXPECT_NEAR(x(1), 2.0, 1e-15);
+}
+
+TEST_P(Cholesky, NotPositiveDefinite) {
+  const Eigen::Matrix2d indefinite = (Eigen::Matrix2d() << 1, 2, 2, 1).finished();
+  EXPECT_TRUE(test::fails_with(ErrorCode::not_positive_definite, {"2 x 2"},
+                               [&] { SparseCholesky(sparse(indefinite), GetParam()); }));
+  EXPECT_TRUE(test::fails_with(ErrorCode::not_positive_definite, {}, [&] {
+    SparseCholesky(sparse(-Eigen::Matrix3d::Identity()), GetParam());
+  }));
+  EXPECT_TRUE(test::fails_with(ErrorCode::not_positive_definite, {},
+                               [&] { SparseCholesky(SparseMatrix(3, 3), GetParam()); }));
+}
+
+TEST_P(Cholesky, WrongShape) {
+  const SparseCholesky factor(sparse(Eigen::Matrix3d::Identity()), GetParam());
+  EXPECT_TRUE(test::fails_with(ErrorCode::wrong_shape, {"3", "4"},
+                               [&] { factor.solve(Eigen::MatrixXd::Zero(4, 1)); }));
+}
+
+TEST_P(Cholesky, NotSquare) {
+  EXPECT_TRUE(test::fails_with(ErrorCode::wrong_shape, {},
+                               [&] { SparseCholesky(SparseMatrix(3, 2), GetParam()); }));
+}
+
+TEST_P(Cholesky, Empty) {
+  const SparseCholesky factor(SparseMatrix(0, 0), GetParam());
+  EXPECT_EQ(factor.size(), 0);
+  const Eigen::MatrixXd x = factor.solve(Eigen::MatrixXd(0, 3));
+  EXPECT_EQ(x.rows(), 0);
+  EXPECT_EQ(x.cols(), 3);
+}
+
+TEST_P(Cholesky, NoRightHandSides) {
+  const SparseCholesky factor(sparse(Eigen::Matrix3d::Identity()), GetParam());
+  const Eigen::MatrixXd x = factor.solve(Eigen::MatrixXd(3, 0));
+  EXPECT_EQ(x.rows(), 3);
+  EXPECT_EQ(x.cols(), 0);
+}
+
+TEST_P(Cholesky, MovesKeepTheFactor) {
+  SparseCholesky first(sparse(2.0 * Eigen::Matrix3d::Identity()), GetParam());
+  SparseCholesky second = std::move(first);
+  first = SparseCholesky(sparse(Eigen::Matrix2d::Identity()), GetParam());
+  EXPECT_NEAR(second.solve(Eigen::Vector3d::Ones())(0), 0.5, 1e-15);
+  EXPECT_EQ(first.size(), 2);
+}
+
+TEST_P(Cholesky, SeveralThreadsSolveTheSame) {
+  const SparseMatrix matrix = definite(zoo::icosphere(2));
+  const SparseCholesky factor(matrix, GetParam());
+  const Eigen::MatrixXd rhs = test::noise(matrix.rows(), 3, 1);
+  const Eigen::MatrixXd expected = factor.solve(rhs);
+  std::vector<Eigen::MatrixXd> results(4);
+  std::vector<std::thread> threads;
+  for (auto& result : results) {
+    threads.emplace_back([&factor, &rhs, &result] {
+      for (int i = 0; i < 20; ++i) {
+        result = factor.solve(rhs);
+      }
+    });
+  }
+  for (auto& thread : threads) {
+    thread.join();
+  }
+  for (const auto& result : results) {
+    EXPECT_EQ(result, expected);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Backends, Cholesky, ::testing::Values(Backend::cholmod, Backend::eigen),
+                         [](const auto& info) {
+                           return info.param == Backend::cholmod ? "cholmod" : "eigen";
+                         });
+
+TEST(CholeskyBackends, GiveTheSameSolution) {
+  if (!SparseCholesky::available(Backend::cholmod)) {
+    GTEST_SKIP() << "this build has no CHOLMOD";
+  }
+  const SparseMatrix matrix = definite(zoo::perturbed_sphere(3, 1));
+  const Eigen::MatrixXd rhs = test::noise(matrix.rows(), 3, 1);
+  const Eigen::MatrixXd a = SparseCholesky(matrix, Backend::cholmod).solve(rhs);
+  const Eigen::MatrixXd b = SparseCholesky(matrix, Backend::eigen).solve(rhs);
+  EXPECT_LT((a - b).norm(), 1e-11 * a.norm());
+}
+
+TEST(CholeskyBackends, EigenIsAlwaysThereAndTheDefaultIsAvailable) {
+  EXPECT_TRUE(SparseCholesky::available(Backend::eigen));
+  EXPECT_TRUE(SparseCholesky::available(SparseCholesky::default_backend()));
+}
+
+TEST(CholeskyBackends, AMissingOneIsNamed) {
+  if (SparseCholesky::available(Backend::cholmod)) {
+    GTEST_SKIP() << "this build has CHOLMOD";
+  }
+  EXPECT_TRUE(test::fails_with(ErrorCode::bad_option, {"CHOLMOD"}, [] {
+    SparseCholesky(sparse(Eigen::Matrix2d::Identity()), Backend::cholmod);
+  }));
+}
+
+}  // namespace
+}  // namespace supple
