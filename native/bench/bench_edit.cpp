@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What an edit costs, by number of vertices: preparing, binding handles, one warm solve.
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <memory>
+#include <numbers>
+
+#include "supple/tasks/edit.h"
+
+namespace supple {
+namespace {
+
+struct Shape {
+  Points vertices;
+  Faces faces;
+};
+
+// A bumpy torus of about `count` vertices: curved, closed, without symmetry that a solver could
+// use.
+Shape bumpy_torus(int count) {
+  const int along = static_cast<int>(std::sqrt(count * 2.5)), around = count / along;
+  Shape shape{Points(along * around, 3), Faces(2 * along * around, 3)};
+  for (int i = 0; i < along; ++i) {
+    for (int j = 0; j < around; ++j) {
+      const double u = 2.0 * std::numbers::pi * i / along, v = 2.0 * std::numbers::pi * j / around;
+      const double r = 0.3 * (1.0 + 0.2 * std::sin(3.0 * u + 0.3) * std::cos(2.0 * v));
+      const double ring = 1.0 + r * std::cos(v);
+      shape.vertices.row(i * around + j) << ring * std::cos(u), ring * std::sin(u), r * std::sin(v);
+      const int a = i * around + j, b = ((i + 1) % along) * around + j;
+      const int c = ((i + 1) % along) * around + (j + 1) % around,
+                d = i * around + (j + 1) % around;
+      shape.faces.row(2 * a) << a, b, c;
+      shape.faces.row(2 * a + 1) << a, c, d;
+    }
+  }
+  return shape;
+}
+
+struct Bound {
+  std::unique_ptr<Editor> editor;
+  std::vector<HandleTarget> targets;
+};
+
+std::vector<Handle> two_handles(const Shape& shape) {
+  std::vector<int> left, right;
+  for (int i = 0; i < shape.vertices.rows(); ++i) {
+    if (shape.vertices(i, 0) < -1.1) {
+      left.push_back(i);
+    } else if (shape.vertices(i, 0) > 1.1) {
+      right.push_back(i);
+    }
+  }
+  const auto vector = [](std::vector<int>& v) {
+    return Eigen::VectorXi(Eigen::Map<Eigen::VectorXi>(v.data(), static_cast<int>(v.size())));
+  };
+  return {{"left", vector(left)}, {"right", vector(right)}};
+}
+
+Bound bind(const std::shared_ptr<const PreparedMesh>& prepared, const Shape& shape) {
+  const Architecture architecture;
+  Bound bound;
+  bound.editor = std::make_unique<Editor>(
+      prepared, two_handles(shape), std::make_shared<LocalJacobianNetwork<float>>(architecture, 1));
+  Eigen::Matrix4d lifted = Eigen::Matrix4d::Identity();
+  lifted(2, 3) = 0.5;
+  bound.targets = {HandleTarget{}, HandleTarget{lifted, std::nullopt}};
+  return bound;
+}
+
+void prepare(benchmark::State& state) {
+  const Shape shape = bumpy_torus(static_cast<int>(state.range(0)));
+  for (auto _ : state) {
+    const PreparedMesh prepared(shape.vertices, shape.faces);
+    benchmark::DoNotOptimize(prepared.basis.residual);
+  }
+}
+
+void bind_handles(benchmark::State& state) {
+  const Shape shape = bumpy_torus(static_cast<int>(state.range(0)));
+  const auto prepared = std::make_shared<const PreparedMesh>(shape.vertices, shape.faces);
+  for (auto _ : state) {
+    const Bound bound = bind(prepared, shape);
+    benchmark::DoNotOptimize(bound.editor.get());
+  }
+}
+
+// `natural` with its default rounds of the network: the weights' values do not change the time.
+void warm_edit(benchmark::State& state) {
+  const Shape shape = bumpy_torus(static_cast<int>(state.range(0)));
+  const auto prepared = std::make_shared<const PreparedMesh>(shape.vertices, shape.faces);
+  const Bound bound = bind(prepared, shape);
+  for (auto _ : state) {
+    const EditResult result = bound.editor->solve(bound.targets);
+    benchmark::DoNotOptimize(result.vertices.data());
+  }
+}
+
+void network_forward(benchmark::State& state, Eigen::Index samples) {
+  const Shape shape = bumpy_torus(static_cast<int>(state.range(0)));
+  const PreparedMesh prepared(shape.vertices, shape.faces);
+  const NetworkContext<float> context(prepared.operators, prepared.basis, 128, samples);
+  const LocalJacobianNetwork<float> network(Architecture{}, 1);
+  const Signal signal =
+      rotation_signal(prepared.operators.jacobians_of(prepared.operators.vertices));
+  for (auto _ : state) {
+    const MatrixField jacobians = network.forward(context, signal);
+    benchmark::DoNotOptimize(jacobians.data());
+  }
+}
+
+BENCHMARK(prepare)->Arg(1000)->Arg(5000)->Arg(10000)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(bind_handles)
+    ->Arg(1000)
+    ->Arg(5000)
+    ->Arg(10000)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK(warm_edit)
+    ->Arg(1000)
+    ->Arg(5000)
+    ->Arg(10000)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK_CAPTURE(network_forward, sampled, 1024)
+    ->Arg(5000)
+    ->Arg(10000)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK_CAPTURE(network_forward, every_vertex, 0)
+    ->Arg(5000)
+    ->Arg(10000)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+
+}  // namespace
+}  // namespace supple

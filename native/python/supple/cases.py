@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Edit cases on disk: a folder with mesh.obj, case.json and, where it is known, truth.obj."""
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import meshio
+import numpy as np
+from numpy.typing import NDArray
+
+from .editing import Handle
+from .errors import SuppleError
+
+
+@dataclass
+class EditCase:
+    """One edit to make.
+
+    Attributes:
+        name: the folder's name.
+        vertices: (n, 3) rest positions.
+        faces: (m, 3) triangles; larger polygons are split into fans.
+        handles: what to hold and move.
+        truth: (n, 3) the true pose, or None.
+    """
+
+    name: str
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    handles: list[Handle]
+    truth: NDArray[np.float64] | None
+
+
+def read_case(folder: str | os.PathLike) -> EditCase:
+    """Read a case folder.
+
+    case.json: {"handles": [{"name", "vertices": [0-based], and "matrix": 4x4 rows for column vectors or
+    "positions": [[x, y, z], ...] or neither (held)}]}.
+
+    Raises:
+        SuppleError: bad_case, naming the file and what is wrong with it.
+    """
+    folder = Path(folder)
+    vertices, faces = read_mesh(folder / "mesh.obj")
+    handles = _read_handles(folder / "case.json")
+    truth = None
+    if (folder / "truth.obj").is_file():
+        truth, _ = read_mesh(folder / "truth.obj")
+        if len(truth) != len(vertices):
+            raise SuppleError(
+                "bad_case",
+                f"{folder / 'truth.obj'} has {len(truth)} vertices, mesh.obj {len(vertices)}; they "
+                "must be the same vertices.",
+            )
+    return EditCase(folder.resolve().name, vertices, faces, handles, truth)
+
+
+def read_mesh(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """(n, 3) vertices in file order and (m, 3) triangles of any format meshio reads.
+
+    Raises:
+        SuppleError: bad_case.
+    """
+    if not path.is_file():
+        raise SuppleError("bad_case", f"There is no file {path}.")
+    try:
+        mesh = meshio.read(path)
+    except (meshio.ReadError, ValueError, IndexError, SystemExit) as error:
+        raise SuppleError("bad_case", f"{path} cannot be read as a mesh: {error}.") from error
+    triangles = [
+        np.stack([block.data[:, 0], block.data[:, i], block.data[:, i + 1]], axis=1)
+        for block in mesh.cells
+        if block.data.ndim == 2 and block.data.shape[1] >= 3
+        for i in range(1, block.data.shape[1] - 1)
+    ]
+    faces = np.concatenate(triangles) if triangles else np.zeros((0, 3))
+    return np.asarray(mesh.points, dtype=np.float64)[:, :3], faces.astype(np.int32)
+
+
+def write_mesh(path: Path, vertices: NDArray, faces: NDArray) -> None:
+    """Write triangles; the format follows the file's ending."""
+    meshio.write_points_cells(path, vertices, [("triangle", faces)])
+
+
+def _read_handles(path: Path) -> list[Handle]:
+    if not path.is_file():
+        raise SuppleError("bad_case", f"There is no file {path}.")
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise SuppleError("bad_case", f"{path} is not valid JSON: {error}.") from error
+    if not isinstance(content, dict) or not isinstance(content.get("handles"), Sequence):
+        raise SuppleError("bad_case", f'{path} must hold {{"handles": [...]}}.')
+    handles = []
+    for i, entry in enumerate(content["handles"]):
+        if not isinstance(entry, dict) or "vertices" not in entry:
+            raise SuppleError("bad_case", f"{path}: handle {i} has no 'vertices'.")
+        unknown = set(entry) - {"name", "vertices", "matrix", "positions"}
+        if unknown:
+            raise SuppleError(
+                "bad_case",
+                f"{path}: handle {i} has '{sorted(unknown)[0]}', which is none of name, vertices, "
+                "matrix, positions.",
+            )
+        handles.append(
+            Handle(
+                str(entry.get("name", f"handle {i}")),
+                entry["vertices"],
+                entry.get("matrix"),
+                entry.get("positions"),
+            )
+        )
+    return handles
