@@ -147,3 +147,9 @@ use_blender_home() {
   export BLENDER_USER_RESOURCES=$1 BLENDER_USER_CONFIG=$1/config \
     BLENDER_USER_SCRIPTS=$1/scripts BLENDER_USER_DATAFILES=$1/datafiles
 }
+
+# debian_blender ARGUMENT...: Debian's Blender with Debian's Python. It takes the modules of the first
+# python3 on the path, so .venv/bin or another Python there would swap its NumPy for one it can't use.
+debian_blender() {
+  env -u PYTHONPATH -u PYTHONHOME -u VIRTUAL_ENV PATH=/usr/bin:/bin /usr/bin/blender "$@"
+}
