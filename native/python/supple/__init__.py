@@ -12,7 +12,6 @@ import os
 # than waking them (measured 17 times on 2 cores). Read when the native module loads, so set before.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
-# ruff: noqa: E402
 from ._native import Progress, __version__
 from .deforming import deform
 from .editing import Editor, EditResult, Handle, edit

@@ -108,9 +108,7 @@ def _edit_case(
 
     prepared = _watched(f"{case.name}: preparing", prepare)
     editor = supple.Editor(prepared, case.handles, model=model)
-    result = _watched(
-        f"{case.name}: solving", lambda p: editor.solve(mode=mode.value, progress=p)
-    )
+    result = _watched(f"{case.name}: solving", lambda p: editor.solve(mode=mode.value, progress=p))
     times = sorted(
         editor.solve(mode=mode.value).report["milliseconds"] for _ in range(_MEASURED_SOLVES)
     )

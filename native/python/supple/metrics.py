@@ -28,7 +28,7 @@ def flipped_faces(rest: ArrayLike, faces: ArrayLike, posed: ArrayLike) -> int:
 
 
 def pose_error(rest: ArrayLike, faces: ArrayLike, posed: ArrayLike, truth: ArrayLike) -> float:
-    """Area-weighted RMS distance to the true (n, 3) pose, x100 of the square root of the rest area."""
+    """Area-weighted RMS distance to the true (n, 3) pose, x100 of the root of the rest area."""
     return _native.pose_error(*_checked(rest, faces, posed), arrays.points(truth, "truth"))
 
 

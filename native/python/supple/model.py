@@ -100,7 +100,7 @@ def load_model(name_or_path: str | os.PathLike) -> Model:
     try:
         with safetensors.safe_open(path, framework="numpy") as file:
             metadata = dict(file.metadata() or {})
-            tensors = {name: file.get_tensor(name) for name in file.keys()}
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - no dict
     except (safetensors.SafetensorError, OSError, ValueError, TypeError) as error:
         raise SuppleError(
             "model_file",

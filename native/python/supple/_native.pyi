@@ -1,0 +1,327 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""
+Native core of Supple; use the package `supple`, which checks and documents.
+"""
+
+from __future__ import annotations
+
+import collections.abc
+import typing
+
+import numpy
+import numpy.typing
+import scipy.sparse
+
+__all__: list[str] = [
+    "Architecture",
+    "EditReport",
+    "Editor",
+    "Handle",
+    "HandleTarget",
+    "Network",
+    "Note",
+    "PreparedMesh",
+    "Progress",
+    "TrainOptions",
+    "TrainingPair",
+    "TriangleMesh",
+    "closest_rotations",
+    "cotan_laplacian",
+    "deform",
+    "eigenbasis",
+    "face_areas",
+    "face_distortion",
+    "flipped_faces",
+    "gradient",
+    "jacobians",
+    "lumped_mass",
+    "pose_error",
+    "symmetric_dirichlet",
+    "train",
+    "train_double",
+]
+
+class Progress:
+    """
+    Progress and cancellation of one long call.
+
+    Pass a new one as `progress=` and watch it from another thread; every member may be used from any thread.
+    """
+    def __init__(self) -> None: ...
+    def cancel(self) -> None:
+        """
+        Ask the call to stop; it raises Cancelled soon after.
+        """
+    @property
+    def cancelled(self) -> bool:
+        """
+        Whether cancel was called.
+        """
+    @property
+    def fraction(self) -> float:
+        """
+        Done part of the call, 0 to 1.
+        """
+    @property
+    def seconds_left(self) -> float | None:
+        """
+        Estimated seconds left; None before 2% is done.
+        """
+    @property
+    def stage(self) -> str:
+        """
+        What is being done, in words.
+        """
+
+class Note:
+    @property
+    def code(self) -> str: ...
+    @property
+    def count(self) -> int: ...
+    @property
+    def message(self) -> str: ...
+
+class TriangleMesh:
+    def __init__(
+        self,
+        vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+        faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    ) -> None: ...
+    @property
+    def notes(self) -> list[Note]: ...
+
+class Architecture:
+    def __init__(
+        self,
+        configuration: str,
+        signal: str,
+        eigenfunctions: typing.SupportsInt | typing.SupportsIndex = 128,
+        width: typing.SupportsInt | typing.SupportsIndex = 256,
+    ) -> None: ...
+    @property
+    def configuration(self) -> str: ...
+    @property
+    def eigenfunctions(self) -> int: ...
+    @property
+    def inputs(self) -> int: ...
+    @property
+    def outputs(self) -> int: ...
+    @property
+    def signal(self) -> str: ...
+    @property
+    def width(self) -> int: ...
+
+class Network:
+    @staticmethod
+    def untrained(
+        architecture: Architecture, seed: typing.SupportsInt | typing.SupportsIndex
+    ) -> Network: ...
+    def __init__(
+        self,
+        architecture: Architecture,
+        tensors: collections.abc.Mapping[
+            str, typing.Annotated[numpy.typing.ArrayLike, numpy.float32, "[m, n]"]
+        ],
+    ) -> None: ...
+    def tensors(
+        self,
+    ) -> dict[str, typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]"]]: ...
+    @property
+    def architecture(self) -> Architecture: ...
+
+class TrainOptions:
+    architecture: Architecture
+    def __init__(self) -> None: ...
+    @property
+    def epochs(self) -> int: ...
+    @epochs.setter
+    def epochs(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def fewest_eigenfunctions(self) -> int: ...
+    @fewest_eigenfunctions.setter
+    def fewest_eigenfunctions(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def first_learning_rate(self) -> float: ...
+    @first_learning_rate.setter
+    def first_learning_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def last_learning_rate(self) -> float: ...
+    @last_learning_rate.setter
+    def last_learning_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def loss_weights(self) -> typing.Annotated[list[float], "FixedSize(3)"]: ...
+    @loss_weights.setter
+    def loss_weights(
+        self,
+        arg1: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+        ],
+    ) -> None: ...
+    @property
+    def most_eigenfunctions(self) -> int: ...
+    @most_eigenfunctions.setter
+    def most_eigenfunctions(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def samples(self) -> int: ...
+    @samples.setter
+    def samples(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def seed(self) -> int: ...
+    @seed.setter
+    def seed(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+
+class TrainingPair:
+    def __init__(
+        self,
+        source: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+        faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+        target: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    ) -> None: ...
+
+class PreparedMesh:
+    def __init__(
+        self,
+        vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+        faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+        eigenfunctions: typing.SupportsInt | typing.SupportsIndex = 128,
+        samples: typing.SupportsInt | typing.SupportsIndex = 1024,
+        progress: Progress = None,
+    ) -> None: ...
+    @property
+    def diagonal(self) -> float: ...
+    @property
+    def eigenvalues(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def faces(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]"]: ...
+    @property
+    def notes(self) -> list[Note]: ...
+    @property
+    def residual(self) -> float: ...
+    @property
+    def vertices(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+
+class Handle:
+    def __init__(
+        self, name: str, vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"]
+    ) -> None: ...
+
+class HandleTarget:
+    def __init__(
+        self,
+        matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] | None = None,
+        positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"] | None = None,
+    ) -> None: ...
+
+class EditReport:
+    @property
+    def network(self) -> bool: ...
+    @property
+    def passes(self) -> int: ...
+    @property
+    def passes_milliseconds(self) -> float: ...
+    @property
+    def rounds(self) -> int: ...
+    @property
+    def rounds_milliseconds(self) -> float: ...
+    @property
+    def suggestion_milliseconds(self) -> float: ...
+    @property
+    def total_milliseconds(self) -> float: ...
+
+class Editor:
+    def __init__(
+        self,
+        prepared: PreparedMesh,
+        handles: collections.abc.Sequence[Handle],
+        network: Network,
+        progress: Progress = None,
+    ) -> None: ...
+    def solve(
+        self,
+        targets: collections.abc.Sequence[HandleTarget],
+        mode: str = "natural",
+        rounds: typing.SupportsInt | typing.SupportsIndex = -1,
+        passes: typing.SupportsInt | typing.SupportsIndex = -1,
+        network: bool = True,
+        loose_pieces_follow: bool = True,
+        progress: Progress = None,
+    ) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"], EditReport]: ...
+
+def closest_rotations(
+    jacobians: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 9]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]: ...
+def cotan_laplacian(
+    vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+) -> scipy.sparse.csc_matrix: ...
+def deform(
+    prepared: PreparedMesh,
+    target: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    eigenfunctions: typing.SupportsInt | typing.SupportsIndex,
+    network: Network,
+    progress: Progress = None,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+def eigenbasis(
+    vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    count: typing.SupportsInt | typing.SupportsIndex,
+    progress: Progress = None,
+) -> tuple[
+    typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"],
+    typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"],
+    float,
+]: ...
+def face_areas(
+    vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+def face_distortion(
+    rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    posed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+def flipped_faces(
+    rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    posed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+) -> int: ...
+def gradient(
+    vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+) -> scipy.sparse.csc_matrix: ...
+def jacobians(
+    rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    moved: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]: ...
+def lumped_mass(
+    vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+def pose_error(
+    rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    posed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    truth: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+) -> float: ...
+def symmetric_dirichlet(
+    rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    posed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+) -> float: ...
+def train(
+    pairs: collections.abc.Sequence[TrainingPair],
+    options: TrainOptions,
+    max_steps: typing.SupportsInt | typing.SupportsIndex = 0,
+    on_step: typing.Any = None,
+    progress: Progress = None,
+) -> dict: ...
+def train_double(
+    pairs: collections.abc.Sequence[TrainingPair],
+    options: TrainOptions,
+    max_steps: typing.SupportsInt | typing.SupportsIndex = 0,
+    on_step: typing.Any = None,
+    progress: Progress = None,
+) -> dict: ...
+
+__version__: str
