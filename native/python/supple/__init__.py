@@ -3,13 +3,14 @@
 
 Arrays in, arrays out: vertices are (n, 3) in the caller's units, faces (m, 3) 0-based triangles,
 matrices (4, 4) for column vectors. Every error is a SuppleError with a code and a readable message.
-Source: Deformation Recovery: Localized Learning for Detail-Preserving Deformations, SIGGRAPH Asia 2024.
+Source: "Deformation Recovery: Localized Learning for Detail-Preserving Deformations", SIGGRAPH Asia
+2024.
 """
 
 import os
 
-# OpenMP's threads spin between loops unless told to sleep, and beside a busy Blender that costs far more
-# than waking them (measured 17 times on 2 cores). Read when the native module loads, so set before.
+# OpenMP's threads spin between loops unless told to sleep, and beside a busy Blender that costs far
+# more than waking them (measured 17 times on 2 cores). Read when the native module loads.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 from ._native import Progress, __version__

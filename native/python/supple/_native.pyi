@@ -45,7 +45,7 @@ class Progress:
     """
     Progress and cancellation of one long call.
 
-    Pass a new one as `progress=` and watch it from another thread; every member may be used from any thread.
+    Pass a new one as `progress=` and watch it from another thread.
     """
     def __init__(self) -> None: ...
     def cancel(self) -> None:

@@ -37,8 +37,8 @@ class EditCase:
 def read_case(folder: str | os.PathLike) -> EditCase:
     """Read a case folder.
 
-    case.json: {"handles": [{"name", "vertices": [0-based], and "matrix": 4x4 rows for column vectors or
-    "positions": [[x, y, z], ...] or neither (held)}]}.
+    case.json: {"handles": [{"name", "vertices": [0-based], and "matrix": 4x4 for column vectors
+    or "positions": [[x, y, z], ...] or neither (held)}]}.
 
     Raises:
         SuppleError: bad_case, naming the file and what is wrong with it.

@@ -20,7 +20,7 @@ def deform(
     network: bool = True,
     progress: _native.Progress | None = None,
 ) -> NDArray[np.float64]:
-    """The target with its detail, from its coordinates in few eigenfunctions. Source: the paper, 4.2.
+    """The target with its detail, from its coordinates in few eigenfunctions. The paper, 4.2.
 
     Args:
         prepared: the source.

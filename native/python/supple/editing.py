@@ -60,7 +60,7 @@ class EditResult:
 
 
 class Editor:
-    """Handles bound to a prepared mesh: factored once, solved for any targets. Source: the paper, 4.4.
+    """Handles bound to a prepared mesh: factored once, solved for any targets. The paper, 4.4.
 
     Args:
         prepared: the rest mesh.

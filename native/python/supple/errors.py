@@ -17,7 +17,7 @@ class SuppleError(ValueError):
         self.code = code
 
 
-class Cancelled(SuppleError):
+class Cancelled(SuppleError):  # noqa: N818 - a wish granted, not an error
     """A long call stopped because its Progress was asked to cancel; nothing was changed."""
 
 

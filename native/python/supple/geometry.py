@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Discrete operators of a triangle mesh, for researchers. Sparse results need SciPy installed.
 
-Faces must have an area here: these are the operators themselves, without the repairs of PreparedMesh.
-Conventions are those of docs/conventions.md.
+Faces must have an area here: these are the operators themselves, without the repairs of
+PreparedMesh. Conventions are those of docs/conventions.md.
 """
 
 from typing import TYPE_CHECKING
@@ -23,7 +23,7 @@ def _mesh(vertices: ArrayLike, faces: ArrayLike) -> tuple[NDArray, NDArray]:
 
 
 def cotan_laplacian(vertices: ArrayLike, faces: ArrayLike) -> "scipy.sparse.csc_matrix":
-    """(n, n) positive semidefinite cotangent Laplacian W; rows sum to 0. Pinkall and Polthier 1993."""
+    """(n, n) cotangent Laplacian W, positive semidefinite, rows sum to 0. Pinkall and Polthier."""
     return _native.cotan_laplacian(*_mesh(vertices, faces))
 
 
@@ -43,7 +43,7 @@ def face_areas(vertices: ArrayLike, faces: ArrayLike) -> NDArray[np.float64]:
 
 
 def jacobians(rest: ArrayLike, faces: ArrayLike, moved: ArrayLike) -> NDArray[np.float64]:
-    """(m, 3, 3) Jacobians J = E1^-1 E2: rest edges (rows) times J are moved edges. The paper, Eqn 2."""
+    """(m, 3, 3) Jacobians J = E1^-1 E2: rest edges (rows) times J are moved edges. Eqn 2."""
     rest, faces = _mesh(rest, faces)
     return _native.jacobians(rest, faces, arrays.points(moved, "moved")).reshape(-1, 3, 3)
 
@@ -61,8 +61,11 @@ def eigenbasis(
     *,
     progress: _native.Progress | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """The first eigenfunctions of W phi = lambda M phi: (n, k) M-orthonormal functions, (k,) ascending
-    values in 1 / area, and the largest |M^-1/2 (W phi - lambda M phi)| / max(lambda, 1). k is at most n.
+    """The first eigenfunctions of W phi = lambda M phi, k = min(count, n) of them.
+
+    Returns:
+        (n, k) M-orthonormal functions; (k,) ascending values in 1 / area; and the largest
+        |M^-1/2 (W phi - lambda M phi)| / max(lambda, 1).
 
     Raises:
         SuppleError: no_convergence, bad_option. Cancelled: if progress was cancelled.
