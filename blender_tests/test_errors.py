@@ -173,7 +173,7 @@ def test_errors_of_the_native_part_name_the_object(addon, monkeypatch):
     supple = addon("native").supple()
 
     def fail(*_arguments, **_options):
-        raise supple.SuppleError("the sky fell")
+        raise supple.SuppleError("not_finite", "the sky fell")
 
     with_handles()
     monkeypatch.setattr(supple, "Editor", fail)

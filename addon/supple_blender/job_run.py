@@ -123,7 +123,7 @@ def _pose(job, obj):
     groups.require_members(obj.name, found)
     motions = [_motion(move, found[move.group], rest, world) for move in job.moves]
     pose_input = pose.PoseInput(rest=rest, motions=motions, mode=job.mode, network=job.network)
-    return rest, pose.solve(pose_input, Stages())
+    return pose_input, pose.solve(pose_input, Stages())
 
 
 @contextmanager
@@ -152,7 +152,8 @@ def _save(path):
         raise UserError(f"{path}: can't be saved: {error}") from error
 
 
-def _report(job, rest, result, seconds):
+def _report(job, pose_input, result, seconds):
+    rest = pose_input.rest
     return {
         "object": rest.name,
         "vertices": len(rest.positions),
@@ -162,7 +163,8 @@ def _report(job, rest, result, seconds):
         "network": job.network,
         "shape_key": job.key,
         "notes": result.notes,
-        "figures": result.report,
+        "figures": pose.figures(pose_input, result),
+        "solve": result.report,
         "seconds": seconds,
         "supple": native.supple().__version__,
         "addon": ".".join(map(str, VERSION)),
@@ -186,7 +188,7 @@ def run(job):
         _add_groups(obj, job.source.groups, file)
     shape_keys.require_free(obj, job.key, job.overwrite)
     _say(f"{obj.name}: {len(obj.data.vertices):,} vertices, {len(job.moves)} handles")
-    rest, result = _pose(job, obj)
+    pose_input, result = _pose(job, obj)
     seconds = time.perf_counter() - start
     shape_keys.write(obj, job.key, result.positions)
     for note in result.notes:
@@ -199,7 +201,7 @@ def run(job):
         if pictures:
             job_render.before_and_after(obj, job.key, render, partial)
         if job.report:
-            report = _report(job, rest, result, seconds)
+            report = _report(job, pose_input, result, seconds)
             text = json.dumps(report, indent=2, default=_plain)
             partial[job.report].write_text(text + "\n", encoding="utf-8")
     for path in targets:

@@ -86,6 +86,30 @@ def _solve(pose_input, stages):
     )
     return Pose(
         positions=space.to_local_points(rest.stretch, np.asarray(result.vertices)),
-        notes=[note.message for note in (*mesh.notes, *result.notes)],
+        notes=[note.message for note in result.notes],
         report=dict(result.report),
     )
+
+
+def figures(pose_input, pose):
+    """Return how good a Pose is: handle_error (largest distance of a handle's vertex to its target,
+    as a part of the bounding box's diagonal), symmetric_dirichlet and flipped_faces, in the shape
+    as the object's scale shows it.
+    """
+    supple = native.supple()
+    rest = pose_input.rest
+    error = 0.0
+    for motion in pose_input.motions:
+        at_rest, posed = rest.positions[motion.vertices], pose.positions[motion.vertices]
+        matrix = np.eye(4) if motion.matrix is None else motion.matrix
+        target = at_rest @ matrix[:3, :3].T + matrix[:3, 3]
+        offsets = space.to_solve_points(rest.stretch, posed - target)
+        error = max(error, float(np.linalg.norm(offsets, axis=1).max()))
+    before, after = (
+        space.to_solve_points(rest.stretch, p) for p in (rest.positions, pose.positions)
+    )
+    return {
+        "handle_error": error / float(np.linalg.norm(np.ptp(before, axis=0))),
+        "symmetric_dirichlet": supple.symmetric_dirichlet(before, rest.triangles, after),
+        "flipped_faces": supple.flipped_faces(before, rest.triangles, after),
+    }
