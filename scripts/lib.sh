@@ -40,7 +40,7 @@ apt_install() {
     sudo -n true 2>/dev/null ||
       die "these Debian packages are missing, and neither root nor sudo without a password is at" \
         "hand to install them. Run: sudo apt-get install --no-install-recommends ${missing[*]}"
-    as_root=(sudo -n --preserve-env=DEBIAN_FRONTEND)
+    as_root=(sudo -n env "DEBIAN_FRONTEND=$DEBIAN_FRONTEND")
   fi
   local apt=("${as_root[@]}" apt-get -q -o Acquire::Retries=3 -o DPkg::Lock::Timeout=300)
 
