@@ -189,7 +189,8 @@ TEST(StableCount, OfTheSphereEndsWholeMultiplets) {
   EXPECT_EQ(basis.stable_count(4), 4);
   EXPECT_EQ(basis.stable_count(8), 4);
   EXPECT_EQ(basis.stable_count(9), 9);
-  EXPECT_EQ(basis.stable_count(12), 9);
+  // The icosahedron splits the seven functions of l = 3 in three and four.
+  EXPECT_EQ(basis.stable_count(10), 9);
 }
 
 TEST(EigenbasisErrors, NoFunctionsAskedFor) {
@@ -197,10 +198,10 @@ TEST(EigenbasisErrors, NoFunctionsAskedFor) {
   EXPECT_TRUE(test::fails_with(ErrorCode::bad_option, {"0"}, [&] { basis_of(operators, 0); }));
 }
 
-TEST(EigenbasisErrors, AResidualOutOfReachIsReported) {
-  const SurfaceOperators operators = operators_of(zoo::perturbed_sphere(2, 7));
+TEST(EigenbasisErrors, TooFewIterationsAreReported) {
+  const SurfaceOperators operators = operators_of(zoo::perturbed_sphere(3, 7));
   EXPECT_TRUE(test::fails_with(ErrorCode::no_convergence, {"residual"}, [&] {
-    eigenbasis(operators.laplacian, operators.mass, {.count = 20, .residual = 1e-30});
+    eigenbasis(operators.laplacian, operators.mass, {.count = 100, .max_iterations = 0});
   }));
 }
 

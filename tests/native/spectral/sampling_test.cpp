@@ -2,6 +2,7 @@
 #include "supple/spectral/sampling.h"
 
 #include <set>
+#include <vector>
 
 #include "native/support.h"
 #include "supple/geometry/surface_operators.h"
@@ -67,27 +68,28 @@ TEST(FarthestPoints, AllWhereThereAreNoMore) {
   EXPECT_EQ(farthest_point_samples(points, 50), Eigen::VectorXi::LinSpaced(5, 0, 4));
 }
 
-class SampledDomain : public ::testing::TestWithParam<zoo::Mesh> {};
+class SampledDomain : public ::testing::TestWithParam<zoo::Entry> {};
 
 TEST_P(SampledDomain, ProjectorIsExactOnTheSpan) {
-  const Eigenbasis basis = basis_of(GetParam(), 30);
-  const Eigen::VectorXi samples = farthest_point_samples(GetParam().vertices, 120);
-  const auto domain = sampled_domain<double>(basis, 25, GetParam().vertices, samples);
+  const zoo::Mesh& mesh = GetParam().mesh;
+  const Eigenbasis basis = basis_of(mesh, 30);
+  const Eigen::VectorXi samples = farthest_point_samples(mesh.vertices, 120);
+  const auto domain = sampled_domain<double>(basis, 25, mesh.vertices, samples);
   ASSERT_EQ(domain.functions.rows(), 120);
   ASSERT_EQ(domain.projector.rows(), 25);
   const Eigen::MatrixXd product = domain.projector * domain.functions;
   EXPECT_LT((product - Eigen::MatrixXd::Identity(25, 25)).cwiseAbs().maxCoeff(), 1e-8);
 }
 
-INSTANTIATE_TEST_SUITE_P(Shapes, SampledDomain,
-                         ::testing::Values(zoo::icosphere(3), zoo::perturbed_sphere(3, 1),
-                                           zoo::two_spheres(2), zoo::open_cylinder(20, 20),
-                                           zoo::with_slivers(zoo::icosphere(2), 1e-3)),
-                         [](const auto& info) {
-                           constexpr const char* kNames[] = {"sphere", "perturbed", "two_spheres",
-                                                             "cylinder", "slivers"};
-                           return kNames[info.index];
-                         });
+std::vector<zoo::Entry> larger_shapes() {
+  return {{.name = "sphere", .mesh = zoo::icosphere(3)},
+          {.name = "perturbed", .mesh = zoo::perturbed_sphere(3, 1)},
+          {.name = "two_spheres", .mesh = zoo::two_spheres(2)},
+          {.name = "cylinder", .mesh = zoo::open_cylinder(20, 20)},
+          {.name = "slivers", .mesh = zoo::with_slivers(zoo::icosphere(2), 1e-3)}};
+}
+INSTANTIATE_TEST_SUITE_P(Shapes, SampledDomain, ::testing::ValuesIn(larger_shapes()),
+                         test::entry_name);
 
 TEST(SampledDomainLimits, WithEveryVertexIsTheFullDomain) {
   const zoo::Mesh mesh = zoo::perturbed_sphere(1, 3);

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "supple/learning/trainer.h"
+
+#include <limits>
+#include <set>
+#include <tuple>
+
+#include "native/support.h"
+
+namespace supple {
+namespace {
+
+using Kind = std::tuple<Configuration, SignalKind>;
+
+std::vector<TrainingPair> tiny_pairs() {
+  const zoo::Mesh a = zoo::perturbed_sphere(1, 3), b = zoo::open_cylinder(8, 5);
+  return {{a.vertices, a.faces, test::bent(a.vertices)},
+          {b.vertices, b.faces, test::bent(b.vertices)}};
+}
+
+TrainOptions tiny_options(Configuration configuration, SignalKind signal) {
+  TrainOptions options;
+  options.architecture = {
+      .configuration = configuration, .signal = signal, .eigenfunctions = 16, .width = 16};
+  options.epochs = 30;
+  options.first_learning_rate = 5e-3;
+  options.last_learning_rate = 1e-4;
+  options.samples = configuration == Configuration::paper ? 0 : 30;
+  options.fewest_eigenfunctions = 6;
+  options.most_eigenfunctions = 12;
+  options.seed = 4;
+  return options;
+}
+
+class Training : public ::testing::TestWithParam<Kind> {
+ protected:
+  TrainOptions options = tiny_options(std::get<0>(GetParam()), std::get<1>(GetParam()));
+};
+
+TEST_P(Training, ReducesTheLoss) {
+  Trainer<float> trainer(tiny_pairs(), options);
+  ASSERT_EQ(trainer.total_steps(), 60);
+  double first = 0.0, last = 0.0;
+  for (int step = 0; step < 60; ++step) {
+    const double total = trainer.step().loss.total;
+    first += step < 6 ? total : 0.0;
+    last += step >= 54 ? total : 0.0;
+  }
+  EXPECT_LT(last, 0.8 * first);
+}
+
+TEST_P(Training, SameSeedSameBytes) {
+  options.epochs = 5;
+  Trainer<float> a(tiny_pairs(), options), b(tiny_pairs(), options);
+  for (int step = 0; step < a.total_steps(); ++step) {
+    const TrainStep sa = a.step(), sb = b.step();
+    EXPECT_EQ(sa.loss.total, sb.loss.total);
+    EXPECT_EQ(sa.pair, sb.pair);
+    EXPECT_EQ(sa.eigenfunctions, sb.eigenfunctions);
+  }
+  EXPECT_EQ(a.network().tensors(), b.network().tensors());
+  options.seed = 5;
+  Trainer<float> c(tiny_pairs(), options);
+  EXPECT_NE(c.network().tensors(), a.network().tensors());
+}
+
+TEST_P(Training, EveryPairOnceAnEpochOnTheSchedule) {
+  options.epochs = 4;
+  Trainer<float> trainer(tiny_pairs(), options);
+  for (int epoch = 0; epoch < 4; ++epoch) {
+    std::set<int> seen;
+    for (int i = 0; i < 2; ++i) {
+      const TrainStep step = trainer.step();
+      EXPECT_EQ(step.step, 2 * epoch + i);
+      EXPECT_DOUBLE_EQ(step.learning_rate,
+                       decayed_learning_rate(5e-3, 1e-4, step.step, trainer.total_steps()));
+      seen.insert(step.pair);
+      if (options.architecture.signal == SignalKind::spectral) {
+        EXPECT_GE(step.eigenfunctions, 1);
+        EXPECT_LE(step.eigenfunctions, 12);
+      } else {
+        EXPECT_EQ(step.eigenfunctions, 0);
+      }
+    }
+    EXPECT_EQ(seen.size(), 2U);
+  }
+}
+
+TEST_P(Training, OnMeshesWithFewerVerticesThanFunctions) {
+  // The defaults, 20 to 100 eigenfunctions of the signal and 128 of the network, on 12 vertices.
+  const zoo::Mesh mesh = zoo::perturbed_sphere(0, 3);
+  options.fewest_eigenfunctions = 20;
+  options.most_eigenfunctions = 100;
+  options.architecture.eigenfunctions = 128;
+  Trainer<float> trainer({{mesh.vertices, mesh.faces, test::bent(mesh.vertices)}}, options);
+  for (int step = 0; step < 3; ++step) {
+    const TrainStep result = trainer.step();
+    EXPECT_TRUE(std::isfinite(result.loss.total));
+    EXPECT_LE(result.eigenfunctions, 12);
+  }
+  for (const auto& [name, value] : trainer.network().tensors()) {
+    EXPECT_TRUE(value.allFinite()) << name;
+  }
+}
+
+TEST_P(Training, WithMoreSignalThanNetworkEigenfunctions) {
+  // The signal's count is drawn above the number that the network's basis has.
+  options.architecture.eigenfunctions = 8;
+  options.fewest_eigenfunctions = 20;
+  options.most_eigenfunctions = 40;
+  Trainer<float> trainer(tiny_pairs(), options);
+  EXPECT_TRUE(std::isfinite(trainer.step().loss.total));
+  EXPECT_TRUE(trainer.network().tensors().at("input.mean").allFinite());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Kinds, Training,
+    ::testing::Combine(::testing::Values(Configuration::paper, Configuration::equivariant),
+                       ::testing::Values(SignalKind::rotation, SignalKind::spectral)),
+    [](const auto& info) {
+      return std::string(to_string(std::get<0>(info.param))) + "_" +
+             to_string(std::get<1>(info.param));
+    });
+
+class TrainerErrors : public ::testing::Test {
+ protected:
+  ::testing::AssertionResult fails(ErrorCode code, std::initializer_list<const char*> parts) {
+    return test::fails_with(code, parts, [this] { Trainer<float>(pairs, options); });
+  }
+  std::vector<TrainingPair> pairs = tiny_pairs();
+  TrainOptions options = tiny_options(Configuration::equivariant, SignalKind::spectral);
+};
+
+TEST_F(TrainerErrors, NoPairs) {
+  pairs.clear();
+  EXPECT_TRUE(fails(ErrorCode::bad_option, {"at least one pair"}));
+}
+
+TEST_F(TrainerErrors, ATargetOfAnotherSize) {
+  pairs[1].target.conservativeResize(7, 3);
+  EXPECT_TRUE(fails(ErrorCode::wrong_shape, {"Pair 1", "48", "7"}));
+}
+
+TEST_F(TrainerErrors, ABadMeshNamesPairAndSide) {
+  pairs[1].target(3, 1) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(fails(ErrorCode::not_finite, {"Pair 1", "target", "Vertex 3"}));
+  pairs[0].faces.resize(0, 3);
+  EXPECT_TRUE(fails(ErrorCode::empty_mesh, {"Pair 0", "source"}));
+}
+
+TEST_F(TrainerErrors, TargetsWithOtherFacesWithoutArea) {
+  // The same number of vertices is left on both sides, but not the same vertices.
+  const zoo::Mesh two = zoo::joined(zoo::cube(), zoo::moved(zoo::cube(), {3, 0, 0}));
+  Points source = two.vertices, target = two.vertices;
+  for (int i = 1; i < 8; ++i) {
+    source.row(i) = source.row(0);
+    target.row(8 + i) = target.row(8);
+  }
+  pairs = {{source, two.faces, target}};
+  EXPECT_TRUE(fails(ErrorCode::wrong_shape, {"Pair 0"}));
+}
+
+TEST_F(TrainerErrors, OptionsOutOfRange) {
+  const TrainOptions good = options;
+  const auto expect_bad = [&](const std::function<void(TrainOptions&)>& change) {
+    options = good;
+    change(options);
+    EXPECT_TRUE(fails(ErrorCode::bad_option, {}));
+  };
+  expect_bad([](TrainOptions& o) { o.epochs = 0; });
+  expect_bad([](TrainOptions& o) { o.samples = -1; });
+  expect_bad([](TrainOptions& o) { o.fewest_eigenfunctions = 0; });
+  expect_bad([](TrainOptions& o) { o.most_eigenfunctions = o.fewest_eigenfunctions - 1; });
+  expect_bad([](TrainOptions& o) { o.architecture.eigenfunctions = 0; });
+  expect_bad([](TrainOptions& o) { o.architecture.configuration = Configuration::paper; });
+}
+
+TEST_F(TrainerErrors, Cancelled) {
+  Progress progress;
+  progress.cancel();
+  EXPECT_TRUE(test::fails_with(ErrorCode::cancelled, {},
+                               [&] { Trainer<float>(pairs, options, ProgressRange(&progress)); }));
+}
+
+}  // namespace
+}  // namespace supple
