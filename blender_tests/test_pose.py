@@ -176,11 +176,12 @@ def test_edit_mode_poses_what_is_being_edited():
     bpy.ops.supple.handles_from_groups()
     bpy.data.objects["head"].location.z = 0.5
     bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.transform.translate(value=(0, 0, 3))
     bpy.ops.supple.bake(name="Up")
-    assert bar.mode == "EDIT"
-    bpy.ops.object.mode_set(mode="OBJECT")
-    assert np.isclose(bodies.key(bar, "Up")[:, 2].max(), bodies.HEIGHT + 0.5, atol=1e-5)
-    assert np.isclose(bodies.key(bar, "Basis")[:, 2].max(), bodies.HEIGHT, atol=1e-6)
+    assert bar.mode == "OBJECT"
+    assert np.isclose(bodies.key(bar, "Up")[:, 2].max(), 3 + bodies.HEIGHT + 0.5, atol=1e-5)
+    assert np.isclose(bodies.key(bar, "Basis")[:, 2].max(), 3 + bodies.HEIGHT, atol=1e-6)
 
 
 def test_basis_is_the_rest_shape_whatever_other_keys_show():

@@ -117,9 +117,11 @@ class LongOperator:
         return {"CANCELLED"}
 
     def _show(self, context):
-        stopping = " (stopping)" if self._stages.cancelled else "   Esc: cancel"
-        context.window_manager.progress_update(int(100 * self._stages.fraction))
-        context.workspace.status_text_set(self._stages.text(self._inputs.name) + stopping)
+        stages = self._stages
+        esc = "stopping" if stages.cancelled else "Esc cancels"
+        parts = [f"{self._inputs.name}: {stages.doing()}", stages.left(), esc]
+        context.window_manager.progress_update(int(100 * stages.fraction))
+        context.workspace.status_text_set("   ".join(part for part in parts if part))
         _redraw_sidebars(context)
 
     def _leave(self, context):

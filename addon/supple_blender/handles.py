@@ -157,6 +157,7 @@ def create(context, obj, names=(), held=None):
         heights = {name: points[vertices, 2].mean() for name, vertices in found.items()}
         held = _propose_held(heights, np.ptp(points[:, 2]))
     held = set(held or ())
+    mesh_data.leave_mode(obj)
     for name in new:
         kind = "HELD" if name in held else "MOVED"
         _add_row(context, obj, name, world, rest.positions[found[name]], kind)
@@ -182,6 +183,7 @@ def remove(obj, name):
             f"{obj.name}: there is no handle '{name}'. "
             f"Its handles are {some(row.name for row in obj.supple.handles) or 'none'}."
         )
+    mesh_data.leave_mode(obj)
     _drop_row(obj, index)
     obj.supple.active_handle = max(0, min(obj.supple.active_handle, len(obj.supple.handles) - 1))
     if not obj.supple.handles:
@@ -191,6 +193,7 @@ def remove(obj, name):
 def clear(obj):
     """Remove all handles of obj, their Empties, and their collection if nothing else is in it."""
     mesh_data.require_mesh(obj)
+    mesh_data.leave_mode(obj)
     body = obj.supple
     copied = any(not owns(obj, row) for row in body.handles)
     while body.handles:
@@ -214,6 +217,7 @@ def rebind(context, obj):
     rest = mesh_data.collect(obj, world)
     found = groups.members(obj, [row.name for row in obj.supple.handles])
     groups.require_members(obj.name, found)
+    mesh_data.leave_mode(obj)
     for row in obj.supple.handles:
         if row.empty and row.empty.parent == obj:
             centroid = rest.positions[found[row.name]].mean(axis=0)

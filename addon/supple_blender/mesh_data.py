@@ -4,6 +4,7 @@
 import hashlib
 from dataclasses import dataclass
 
+import bpy
 import numpy as np
 
 from . import compat, space
@@ -55,6 +56,16 @@ def flush_edit_mode(obj):
     """Bring what is being edited into the mesh data, so that it can be read."""
     if obj.mode == "EDIT":
         obj.update_from_editmode()
+
+
+def leave_mode(obj):
+    """Put obj into Object Mode, before it is changed.
+
+    The edited copy would overwrite shape keys written beside it, and an undo step made in another
+    mode holds no objects, so that Ctrl+Z would leave them behind.
+    """
+    if obj.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
 
 
 def rest_positions(obj):

@@ -63,8 +63,8 @@ class SUPPLE_PT_mesh(_Sidebar, bpy.types.Panel):
         row.label(text=f"{obj.name}   {len(obj.data.vertices):,} vertices", icon="MESH_DATA")
         if background.running is not None:
             stages = background.running
-            compat.draw_progress(layout, stages.fraction, stages.text(obj.name))
-            layout.label(text="Esc cancels")
+            compat.draw_progress(layout, stages.fraction, stages.doing())
+            layout.label(text=stages.left() or "Esc cancels")
             return
         text = f"Ready, {ready.seconds:.1f} s" if ready else "Prepare"
         row = layout.row(align=True)
@@ -104,7 +104,7 @@ class SUPPLE_PT_pose(_Sidebar, bpy.types.Panel):
         keys = obj.data.shape_keys
         taken = bool(keys and name in keys.key_blocks) and not shape_keys.made(obj, name)
         row = layout.row()
-        row.prop(obj.supple, "key_name")
+        row.prop(obj.supple, "key_name", text="Key")
         column = layout.column(align=True)
         column.operator(SUPPLE_OT_solve.bl_idname)
         bake = column.operator(SUPPLE_OT_bake.bl_idname, text="Bake")

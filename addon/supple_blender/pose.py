@@ -82,7 +82,7 @@ def _solve(pose_input, stages):
         handles,
         mode=pose_input.mode,
         network=pose_input.network,
-        progress=stages.begin("solving", 0.1),
+        progress=stages.begin("Solving", 0.1),
     )
     return Pose(
         positions=space.to_local_points(rest.stretch, np.asarray(result.vertices)),

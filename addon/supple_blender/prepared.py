@@ -58,7 +58,7 @@ def mesh(rest, stages, share=1.0):
     """Return the `supple.PreparedMesh` of a RestMesh, computed unless it is kept already."""
     found = _meshes.get(rest.digest)
     if found is None:
-        progress = stages.begin("preparing", share)
+        progress = stages.begin("Preparing", share)
         found = native.supple().PreparedMesh(
             space.to_solve_points(rest.stretch, rest.positions), rest.triangles, progress=progress
         )
@@ -83,7 +83,7 @@ def editor(rest, prepared_mesh, handles, model, stages, share):
     key = (rest.digest, _handles_key(handles), model)
     found = _editors.get(key)
     if found is None:
-        progress = stages.begin("binding handles", share)
+        progress = stages.begin("Binding handles", share)
         found = native.supple().Editor(prepared_mesh, handles, model=model, progress=progress)
         _editors.put(key, found)
     return found

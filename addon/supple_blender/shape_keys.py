@@ -2,12 +2,10 @@
 """Writing shape keys without touching those that others made."""
 
 import hashlib
-from contextlib import contextmanager
 
-import bpy
 import numpy as np
 
-from . import compat
+from . import compat, mesh_data
 from .errors import UserError
 
 PREVIEW = "Supple Preview"
@@ -55,19 +53,6 @@ def require_free(obj, name, overwrite=False):
         )
 
 
-@contextmanager
-def _object_mode(obj):
-    """Leave Edit Mode for a while: it would write its own copy of the keys over ours."""
-    editing = obj.mode == "EDIT"
-    if editing:
-        bpy.ops.object.mode_set(mode="OBJECT")
-    try:
-        yield
-    finally:
-        if editing:
-            bpy.ops.object.mode_set(mode="EDIT")
-
-
 def _write(obj, name, positions):
     if not obj.data.shape_keys:
         compat.add_key(obj, "Basis")
@@ -78,7 +63,6 @@ def _write(obj, name, positions):
     record = obj.supple.keys.get(name) or obj.supple.keys.add()
     record.name = name
     record.digest = _digest(compat.read_key(key))
-    return key
 
 
 def _remove_preview(obj):
@@ -92,26 +76,25 @@ def _remove_preview(obj):
 
 
 def write(obj, name, positions):
-    """Write local positions (n, 3) to shape key `name` and return its name.
+    """Write local positions (n, 3) to shape key `name` and make it the active key.
 
     Adds the Basis if there is none and the key if there is none, with value 1; a key that exists
-    keeps its value. Every other key is left as it is, except that the preview goes. Call
-    `require_free` before.
+    keeps its value. Every other key is left as it is, except that the preview goes. Ends Edit Mode.
+    Call `require_free` before.
     """
-    with _object_mode(obj):
-        if name != PREVIEW:
-            _remove_preview(obj)
+    mesh_data.leave_mode(obj)
+    if name == PREVIEW:
         _write(obj, name, positions)
-        if name != PREVIEW:
-            obj.supple.made_basis = False  # a baked key needs it: it is the user's from now on
-    return name
+        return
+    _remove_preview(obj)
+    _write(obj, name, positions)
+    obj.supple.made_basis = False  # a baked key needs it: it is the user's from now on
 
 
 def remove_preview(obj):
     """Remove the preview key, and the Basis if it came with it and nothing else needs it."""
-    if is_ours(obj, PREVIEW):
-        with _object_mode(obj):
-            _remove_preview(obj)
+    mesh_data.leave_mode(obj)
+    _remove_preview(obj)
 
 
 def others_on(obj, name):

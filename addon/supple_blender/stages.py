@@ -44,8 +44,11 @@ class Stages:
         if self._progress:
             self._progress.cancel()
 
-    def text(self, name):
-        """Return one line for the status bar: what is done to object `name`, how far, how long."""
-        line = f"{name}: {self.label} {self.fraction:.0%}"
+    def doing(self):
+        """Return what is done and how far it is, such as 'Preparing 45%'."""
+        return f"{self.label} {self.fraction:.0%}".strip()
+
+    def left(self):
+        """Return how long this stage will take, such as 'about 12 s left', or ''."""
         seconds = self.seconds_left
-        return line if seconds is None else f"{line}, about {seconds:.0f} s left"
+        return "" if seconds is None else f"about {seconds:.0f} s left"
