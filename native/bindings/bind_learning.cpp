@@ -28,6 +28,7 @@ py::dict train(const std::vector<TrainingPair>& pairs, const TrainOptions& optio
       row["step"] = step.step;
       row["pair"] = step.pair;
       row["eigenfunctions"] = step.eigenfunctions;
+      row["suggestion"] = step.suggestion;
       row["learning_rate"] = step.learning_rate;
       row["loss"] = step.loss.total;
       row["jacobian"] = step.loss.jacobian;
@@ -99,11 +100,19 @@ void bind_learning(py::module_& module) {
       .def_readwrite("most_eigenfunctions", &TrainOptions::most_eigenfunctions)
       .def_readwrite("seed", &TrainOptions::seed);
 
-  py::class_<TrainingPair>(module, "TrainingPair")
-      .def(py::init([](const Points& source, const Faces& faces, const Points& target) {
-             return TrainingPair{source, faces, target};
+  py::class_<Suggestion>(module, "Suggestion")
+      .def(py::init([](const Points& vertices, const Eigen::VectorXi& held) {
+             return Suggestion{vertices, held};
            }),
-           py::arg("source"), py::arg("faces"), py::arg("target"));
+           py::arg("vertices"), py::arg("held"));
+
+  py::class_<TrainingPair>(module, "TrainingPair")
+      .def(py::init([](const Points& source, const Faces& faces, const Points& target,
+                       const std::vector<Suggestion>& suggestions) {
+             return TrainingPair{source, faces, target, suggestions};
+           }),
+           py::arg("source"), py::arg("faces"), py::arg("target"),
+           py::arg("suggestions") = std::vector<Suggestion>());
 
   const auto define = [&](const char* name, auto function) {
     module.def(name, function, py::arg("pairs"), py::arg("options"), py::arg("max_steps") = 0,

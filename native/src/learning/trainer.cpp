@@ -74,7 +74,46 @@ struct Trainer<Scalar>::Example {
     }
     context = std::make_unique<NetworkContext<Scalar>>(
         operators, basis, options.architecture.eigenfunctions, options.samples);
+    if (options.architecture.signal == SignalKind::rotation) {
+      for (const Suggestion& suggestion : pair.suggestions) {
+        add(suggestion, index);
+      }
+    }
   }
+
+  void add(const Suggestion& suggestion, int index) {
+    if (suggestion.vertices.rows() != mesh.vertices().rows()) {
+      throw Error(ErrorCode::wrong_shape,
+                  "A suggestion of pair " + std::to_string(index) + " has " +
+                      std::to_string(suggestion.vertices.rows()) + " vertices, the source " +
+                      std::to_string(mesh.vertices().rows()) + "; they must be the same vertices.");
+    }
+    Points moved(operators.vertices.rows(), 3);
+    for (Eigen::Index i = 0; i < moved.rows(); ++i) {
+      moved.row(i) = suggestion.vertices.row(mesh.mesh_vertex()[i]);
+    }
+    std::vector<int> held;
+    for (const int vertex : suggestion.held) {
+      if (vertex < 0 || vertex >= mesh.vertices().rows()) {
+        throw Error(ErrorCode::index_out_of_range,
+                    "A suggestion of pair " + std::to_string(index) + " holds vertex " +
+                        std::to_string(vertex) + "; the source has " +
+                        std::to_string(mesh.vertices().rows()) + ".");
+      }
+      if (mesh.surface_vertex()[vertex] >= 0) {
+        held.push_back(mesh.surface_vertex()[vertex]);
+      }
+    }
+    const auto count = static_cast<Eigen::Index>(held.size());
+    suggestions.push_back(
+        {mesh.to_surface(moved),
+         HeldSystem(operators.laplacian, Eigen::Map<Eigen::VectorXi>(held.data(), count))});
+  }
+
+  struct Edit {
+    Points moved;  // surface units
+    HeldSystem poisson;
+  };
 
   TriangleMesh mesh;
   SurfaceOperators operators;
@@ -82,6 +121,7 @@ struct Trainer<Scalar>::Example {
   Eigenbasis basis, target_basis;
   std::unique_ptr<FreePoisson> poisson;
   std::unique_ptr<NetworkContext<Scalar>> context;
+  std::vector<Edit> suggestions;
 };
 
 template <class Scalar>
@@ -114,9 +154,12 @@ int Trainer<Scalar>::total_steps() const {
 }
 
 template <class Scalar>
-Signal Trainer<Scalar>::signal_of(const Example& example, int eigenfunctions) const {
+Signal Trainer<Scalar>::signal_of(const Example& example, int eigenfunctions,
+                                  int suggestion) const {
   if (options_.architecture.signal == SignalKind::rotation) {
-    return rotation_signal(example.operators.jacobians_of(example.target));
+    return rotation_signal(example.operators.jacobians_of(
+        suggestion < 0 ? example.target
+                       : example.suggestions[static_cast<size_t>(suggestion)].moved));
   }
   const Points coarse =
       spectral_target(example.basis, example.target_basis, example.target, eigenfunctions);
@@ -133,7 +176,10 @@ void Trainer<Scalar>::normalise_inputs() {
   for (const auto& example : examples_) {
     const int middle = (options_.fewest_eigenfunctions + options_.most_eigenfunctions) / 2;
     const RowMatrix<double> raw =
-        network_.raw_inputs(*example->context, signal_of(*example, middle)).template cast<double>();
+        network_
+            .raw_inputs(*example->context,
+                        signal_of(*example, middle, example->suggestions.empty() ? -1 : 0))
+            .template cast<double>();
     sum += raw.colwise().sum();
     squares += raw.colwise().squaredNorm();
     count += static_cast<double>(raw.rows());
@@ -166,13 +212,22 @@ TrainStep Trainer<Scalar>::step() {
     result.eigenfunctions = static_cast<int>(
         std::min(example.basis.stable_count(drawn), example.target_basis.stable_count(drawn)));
   }
+  if (!example.suggestions.empty()) {
+    result.suggestion = draw(generator_, static_cast<int>(example.suggestions.size()));
+  }
 
-  const Signal signal = signal_of(example, result.eigenfunctions);
+  const Signal signal = signal_of(example, result.eigenfunctions, result.suggestion);
   typename LocalJacobianNetwork<Scalar>::Trace trace;
   const MatrixField predicted = network_.forward(*example.context, signal, &trace);
   MatrixField grad;
-  result.loss = supervised_loss(example.operators, *example.poisson, options_.weights,
-                                example.target, predicted, &grad);
+  if (result.suggestion < 0) {
+    result.loss = supervised_loss(example.operators, *example.poisson, options_.weights,
+                                  example.target, predicted, &grad);
+  } else {
+    const auto& edit = example.suggestions[static_cast<size_t>(result.suggestion)];
+    result.loss = supervised_loss(example.operators, edit.poisson, options_.weights, example.target,
+                                  predicted, &grad);
+  }
   auto gradient = LayerParameters<Scalar>::zeros(options_.architecture.sizes());
   network_.backward(*example.context, signal, trace, grad, gradient);
   adam_.step(gradient, result.learning_rate, network_.parameters());

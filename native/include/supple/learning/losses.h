@@ -29,4 +29,10 @@ LossValues supervised_loss(const SurfaceOperators& source, const FreePoisson& po
                            const LossWeights& weights, const Points& target,
                            const MatrixField& predicted, MatrixField* grad);
 
+/// The same loss for an edit: V solves the Poisson equation with the rows `poisson.held()` at their
+/// target, which places it, so nothing is centred.
+LossValues supervised_loss(const SurfaceOperators& source, const HeldSystem& poisson,
+                           const LossWeights& weights, const Points& target,
+                           const MatrixField& predicted, MatrixField* grad);
+
 }  // namespace supple

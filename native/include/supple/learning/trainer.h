@@ -13,11 +13,20 @@
 
 namespace supple {
 
+/// What an edit starts from: some vertices at their targets, the others guessed.
+struct Suggestion {
+  Points vertices;       ///< n x 3
+  Eigen::VectorXi held;  ///< 0-based vertices that are at their targets; at least one a component
+};
+
 /// One supervised example: two embeddings of one connectivity, in any units.
 struct TrainingPair {
   Points source;  ///< n x 3
   Faces faces;    ///< m x 3
   Points target;  ///< n x 3
+  /// For the rotation signal: what it is taken from, one drawn each step, and then the losses hold
+  /// its vertices. Without any, the signal is taken from the target itself, as in the paper.
+  std::vector<Suggestion> suggestions = {};
 };
 
 struct TrainOptions {
@@ -39,6 +48,7 @@ struct TrainStep {
   int step = 0;
   int pair = 0;
   int eigenfunctions = 0;  ///< of the spectral signal; 0 for rotations
+  int suggestion = -1;     ///< which of the pair's; -1 for the target itself
   double learning_rate = 0.0;
   LossValues loss;
 };
@@ -62,7 +72,7 @@ class Trainer {
 
  private:
   struct Example;
-  Signal signal_of(const Example& example, int eigenfunctions) const;
+  Signal signal_of(const Example& example, int eigenfunctions, int suggestion) const;
   void normalise_inputs();
 
   TrainOptions options_;
