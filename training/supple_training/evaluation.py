@@ -12,8 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 import supple
-from numpy.typing import NDArray
 
+from supple_training.edits import farthest_points, true_handles
 from supple_training.pairs import Pair
 
 HANDLE_COUNTS = (8, 16, 40)
@@ -24,31 +24,6 @@ EIGENFUNCTIONS = (40, 80)
 
 Row = dict[str, float]
 Rows = dict[str, Row]
-
-
-def farthest_points(points: NDArray[np.float64], count: int) -> NDArray[np.int64]:
-    """(count,) indices of points (n, 3) that are far from each other, starting at the outermost."""
-    distance = np.linalg.norm(points - points.mean(axis=0), axis=1)
-    chosen = [int(distance.argmax())]
-    distance = np.full(len(points), np.inf)
-    while len(chosen) < count:
-        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
-        chosen.append(int(distance.argmax()))
-    return np.array(chosen)
-
-
-def true_handles(pair: Pair, count: int) -> list[supple.Handle]:
-    """`count` small handles, a vertex and its neighbours each, at their true positions."""
-    source, faces, target = pair
-    free = np.ones(len(source), bool)
-    handles = []
-    for number, centre in enumerate(farthest_points(source, count)):
-        patch = np.unique(faces[np.any(faces == centre, axis=1)])
-        patch = patch[free[patch]]
-        free[patch] = False
-        if len(patch):
-            handles.append(supple.Handle(f"handle {number}", patch, positions=target[patch]))
-    return handles
 
 
 def rotation_rows(pairs: list[Pair], model: supple.Model) -> list[Rows]:
@@ -62,7 +37,9 @@ def rotation_rows(pairs: list[Pair], model: supple.Model) -> list[Rows]:
         prepared = supple.PreparedMesh(source, faces)
         rows: Rows = {"network": {}, "no_network": {}}
         for count in HANDLE_COUNTS:
-            editor = supple.Editor(prepared, true_handles(pair, count), model=model)
+            editor = supple.Editor(
+                prepared, true_handles(pair, farthest_points(source, count)), model=model
+            )
             for name, row in rows.items():
                 posed = editor.solve(mode="natural", network=name == "network").vertices
                 row[f"{count} handles"] = supple.pose_error(source, faces, posed, target)

@@ -25,7 +25,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from supple_training import pairs as pair_store
-from supple_training.console import DEFAULT_CACHE, console, pairs_with_progress
+from supple_training.console import DEFAULT_CACHE, console, pairs_with_progress, progress_bar
+from supple_training.edits import suggestions
 from supple_training.evaluation import evaluate
 
 matplotlib.use("Agg")
@@ -33,6 +34,9 @@ import matplotlib.pyplot as plt
 
 HELD_OUT_SEED = 1_000_000
 """Added to the seed for held-out pairs, which also come from bodies of their own."""
+
+SUGGESTIONS = 4
+"""Edits of each pair that the rotation network is trained on."""
 
 
 class Signal(StrEnum):
@@ -63,7 +67,19 @@ def pair_settings(signal: str, *, pairs: int, seed: int, held_out: bool) -> pair
     )
 
 
-def run_training(pairs: list[pair_store.Pair], **options) -> tuple[supple.TrainResult, float]:
+def with_suggestions(pairs: list[pair_store.Pair], seed: int) -> list[tuple]:
+    """The pairs, each with `SUGGESTIONS` edits by random handles, under a progress bar."""
+    result = []
+    with progress_bar() as bar:
+        task = bar.add_task("editing training pairs", total=len(pairs), note="")
+        for index, pair in enumerate(pairs):
+            rng = np.random.default_rng([seed, index])
+            result.append((*pair, suggestions(pair, rng, SUGGESTIONS)))
+            bar.advance(task)
+    return result
+
+
+def run_training(pairs: list[tuple], **options) -> tuple[supple.TrainResult, float]:
     """`supple.train` under a progress bar; returns its result and the seconds it took.
 
     Ctrl-C cancels the native run and raises KeyboardInterrupt.
@@ -182,6 +198,8 @@ def main(
         except (OSError, ValueError) as error:
             raise typer.BadParameter(str(error), param_hint="--data") from error
         source = f"{len(training)} pairs of the file {data.name}"
+    if signal is Signal.rotation:
+        training = with_suggestions(training, seed)
     unseen = pairs_with_progress(
         pair_settings(signal.value, pairs=held_out, seed=seed, held_out=True),
         cache,
