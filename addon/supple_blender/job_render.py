@@ -11,7 +11,7 @@ from .errors import UserError
 # From the front, a little from its left and above, as portraits are taken.
 VIEW_FROM = Vector((0.45, -1.0, 0.25)).normalized()
 MARGIN = 1.1
-BACKGROUND = (0.55, 0.57, 0.6)
+BACKGROUND = (0.2, 0.21, 0.22)
 
 
 def _seen_points(obj):
@@ -48,8 +48,8 @@ def _add_camera(scene, points, size):
 
 def _add_light(scene):
     light = bpy.data.objects.new("Supple Light", bpy.data.lights.new("Supple Light", "SUN"))
-    light.data.energy = 3.0
-    light.rotation_euler = Vector((1.0, -0.6, 1.2)).to_track_quat("Z", "Y").to_euler()
+    light.data.energy = 2.0
+    light.rotation_euler = Vector((0.6, -1.0, 1.2)).to_track_quat("Z", "Y").to_euler()
     scene.collection.objects.link(light)
     scene.world = bpy.data.worlds.new("Supple World")
     scene.world.use_nodes = True
