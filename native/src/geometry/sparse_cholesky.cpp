@@ -87,6 +87,13 @@ SparseCholesky::SparseCholesky(const SparseMatrix& matrix, Backend backend)
     throw Error(ErrorCode::bad_option,
                 "This build has no CHOLMOD. Use the Eigen backend or build with SuiteSparse.");
   }
+  if (matrix.rows() != matrix.cols()) {
+    throw Error(ErrorCode::wrong_shape, "The system is " + std::to_string(matrix.rows()) + " x " +
+                                            std::to_string(matrix.cols()) + "; it must be square.");
+  }
+  if (matrix.rows() > 0 && matrix.nonZeros() == 0) {
+    check(Eigen::NumericalIssue, matrix.rows());  // CHOLMOD cannot be shown an empty pattern
+  }
   impl_->size = matrix.rows();
   impl_->backend = backend;
   if (matrix.rows() == 0) {

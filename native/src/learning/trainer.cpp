@@ -18,12 +18,12 @@ void check(const TrainOptions& options, size_t pairs) {
   if (pairs == 0) {
     throw Error(ErrorCode::bad_option, "Training needs at least one pair.");
   }
-  if (options.epochs < 1 || options.samples < 0 || options.fewest_eigenfunctions < 1 ||
+  if (options.epochs < 1 || options.samples < 0 || options.architecture.eigenfunctions < 1 ||
+      options.architecture.width < 1 || options.fewest_eigenfunctions < 1 ||
       options.most_eigenfunctions < options.fewest_eigenfunctions) {
-    throw Error(
-        ErrorCode::bad_option,
-        "Training needs epochs >= 1, samples >= 0 and a range of eigenfunctions that starts "
-        "at 1 or more.");
+    throw Error(ErrorCode::bad_option,
+                "Training needs epochs, width and eigenfunctions of at least 1, samples >= 0 and a "
+                "range of signal eigenfunctions that starts at 1 or more.");
   }
   if (options.architecture.configuration == Configuration::paper && options.samples != 0) {
     throw Error(ErrorCode::bad_option,
@@ -53,7 +53,7 @@ struct Trainer<Scalar>::Example {
                       " target vertices; they must be the same vertices.");
     }
     const TriangleMesh moved = checked(pair.target, pair.faces, index, "target");
-    if (moved.surface_vertices().rows() != operators.vertices.rows()) {
+    if (moved.mesh_vertex() != mesh.mesh_vertex()) {
       throw Error(ErrorCode::wrong_shape,
                   "Pair " + std::to_string(index) + " has vertices attached on one side only.");
     }
@@ -108,6 +108,12 @@ struct Trainer<Scalar>::Example {
     suggestions.push_back(
         {mesh.to_surface(moved),
          HeldSystem(operators.laplacian, Eigen::Map<Eigen::VectorXi>(held.data(), count))});
+  }
+
+  /// What there is of `wanted` eigenfunctions of the spectral signal; 0 for rotations.
+  int signal_count(int wanted) const {
+    return target_basis.size() == 0 ? 0
+                                    : static_cast<int>(stable_count(basis, target_basis, wanted));
   }
 
   struct Edit {
@@ -175,11 +181,10 @@ void Trainer<Scalar>::normalise_inputs() {
   double count = 0.0;
   for (const auto& example : examples_) {
     const int middle = (options_.fewest_eigenfunctions + options_.most_eigenfunctions) / 2;
+    const Signal signal =
+        signal_of(*example, example->signal_count(middle), example->suggestions.empty() ? -1 : 0);
     const RowMatrix<double> raw =
-        network_
-            .raw_inputs(*example->context,
-                        signal_of(*example, middle, example->suggestions.empty() ? -1 : 0))
-            .template cast<double>();
+        network_.raw_inputs(*example->context, signal).template cast<double>();
     sum += raw.colwise().sum();
     squares += raw.colwise().squaredNorm();
     count += static_cast<double>(raw.rows());
@@ -208,9 +213,8 @@ TrainStep Trainer<Scalar>::step() {
   const Example& example = *examples_[result.pair];
   if (options_.architecture.signal == SignalKind::spectral) {
     const int range = options_.most_eigenfunctions - options_.fewest_eigenfunctions + 1;
-    const int drawn = options_.fewest_eigenfunctions + draw(generator_, range);
-    result.eigenfunctions = static_cast<int>(
-        std::min(example.basis.stable_count(drawn), example.target_basis.stable_count(drawn)));
+    result.eigenfunctions =
+        example.signal_count(options_.fewest_eigenfunctions + draw(generator_, range));
   }
   if (!example.suggestions.empty()) {
     result.suggestion = draw(generator_, static_cast<int>(example.suggestions.size()));

@@ -159,6 +159,16 @@ Eigen::Index Eigenbasis::stable_count(Eigen::Index limit) const {
   return limit;
 }
 
+Eigen::Index stable_count(const Eigenbasis& a, const Eigenbasis& b, Eigen::Index limit) {
+  while (true) {
+    const Eigen::Index count = b.stable_count(a.stable_count(limit));
+    if (count == limit || count == a.stable_count(count)) {
+      return count;
+    }
+    limit = count;
+  }
+}
+
 Eigenbasis eigenbasis(const SparseMatrix& laplacian, const Eigen::VectorXd& mass,
                       const EigenbasisOptions& options, ProgressRange progress) {
   const Eigen::Index n = mass.size();

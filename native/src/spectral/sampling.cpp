@@ -34,6 +34,8 @@ Eigen::VectorXi farthest_point_samples(const Points& points, Eigen::Index count)
     for (Eigen::Index i = 0; i < n; ++i) {
       distance[i] = std::min(distance[i], (points.row(i) - last).squaredNorm());
     }
+    distance[samples.back()] =
+        -1.0;  // chosen: never again, even where other points coincide with it
     samples.push_back(farthest(distance));
   }
   std::sort(samples.begin(), samples.end());

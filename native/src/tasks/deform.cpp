@@ -33,8 +33,7 @@ Points deform(const PreparedMesh& prepared, const Points& target, int count,
                  progress.stage("eigenbasis of the target", 0.0, 0.8));
 
   const Points truth = mesh.to_surface(target_mesh.from_surface(target_mesh.surface_vertices()));
-  const Eigen::Index cut =
-      std::min(prepared.basis.stable_count(count), target_basis.stable_count(count));
+  const Eigen::Index cut = stable_count(prepared.basis, target_basis, count);
   const Points coarse = spectral_target(prepared.basis, target_basis, truth, cut);
   const Signal signal = spectral_signal(source, prepared.basis, coarse, cut);
   const MatrixField predicted =

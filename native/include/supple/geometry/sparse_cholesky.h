@@ -19,7 +19,8 @@ class SparseCholesky {
   static Backend default_backend();
 
   /// matrix: n x n, symmetric positive definite; both triangles stored.
-  /// Errors: `not_positive_definite`; `bad_option` if the backend is not available.
+  /// Errors: `not_positive_definite`; `wrong_shape` if not square; `bad_option` if the backend is
+  /// not available.
   explicit SparseCholesky(const SparseMatrix& matrix, Backend backend = default_backend());
   ~SparseCholesky();
   SparseCholesky(SparseCholesky&&) noexcept;

@@ -26,6 +26,9 @@ struct Eigenbasis {
   Eigen::Index stable_count(Eigen::Index limit) const;
 };
 
+/// The largest count <= `limit` that cuts through no multiple eigenvalue of either basis (or 1).
+Eigen::Index stable_count(const Eigenbasis& a, const Eigenbasis& b, Eigen::Index limit);
+
 struct EigenbasisOptions {
   int count = 128;  ///< eigenfunctions wanted; min(count, n) are returned
   /// The stated residual; where rounding alone leaves more (16 eps |M^-1/2 W M^-1/2|_1, slivers),
