@@ -53,14 +53,23 @@ def bent(vertices: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return moved.T * rng.uniform(0.9, 1.2) + rng.normal(0, 0.01, vertices.shape)
 
 
+def suggestion(target: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """The target with a wave in it, and a few vertices that are where they belong."""
+    wave = 0.15 * np.sin(2 * target @ rng.normal(size=(3, 3)))
+    held = rng.choice(len(target), 9, replace=False).astype(np.int32)
+    wave[held] = 0
+    return target + wave, held
+
+
 @pytest.fixture(scope="module")
 def pairs() -> list[tuple]:
-    """Three pairs of different size and shape."""
+    """Three pairs of different size and shape, each with two suggestions."""
     rng = np.random.default_rng(5)
     made = []
     for rings in (11, 12, 14):
         vertices, faces = bumpy_sphere(rng, rings)
-        made.append((vertices, faces, bent(vertices, rng)))
+        target = bent(vertices, rng)
+        made.append((vertices, faces, target, [suggestion(target, rng) for _ in range(2)]))
     return made
 
 
@@ -69,7 +78,15 @@ def torch_pairs(pairs) -> list[reference.Pair]:
     return [reference.Pair(*pair) for pair in pairs]
 
 
-def native_run(pairs: list[tuple], kind: str) -> dict:
+# The signal, and whether it is taken from suggestions, as the editing network is trained.
+KINDS = pytest.mark.parametrize(
+    ("kind", "suggested"),
+    [("rotation", False), ("spectral", False), ("rotation", True)],
+    ids=["rotation", "spectral", "edits"],
+)
+
+
+def native_run(pairs: list[tuple], kind: str, suggested: bool) -> dict:
     options = _native.TrainOptions()
     options.architecture = _native.Architecture(
         "paper", kind, eigenfunctions=EIGENFUNCTIONS, width=WIDTH
@@ -78,15 +95,26 @@ def native_run(pairs: list[tuple], kind: str) -> dict:
     options.epochs = 7
     options.fewest_eigenfunctions, options.most_eigenfunctions = 15, 40
     options.seed = 11
-    given = [_native.TrainingPair(*pair) for pair in pairs]
+    given = [
+        _native.TrainingPair(
+            source,
+            faces,
+            target,
+            [_native.Suggestion(*each) for each in suggestions] if suggested else [],
+        )
+        for source, faces, target, suggestions in pairs
+    ]
     return _native.train_double(given, options, max_steps=STEPS)
 
 
-@pytest.mark.parametrize("kind", ["rotation", "spectral"])
-def test_twenty_steps_give_the_losses_and_weights_of_the_reference(pairs, torch_pairs, kind):
-    native = native_run(pairs, kind)
+@KINDS
+def test_twenty_steps_give_the_losses_and_weights_of_the_reference(
+    pairs, torch_pairs, kind, suggested
+):
+    native = native_run(pairs, kind, suggested)
     assert len(native["steps"]) == STEPS
     assert {row["pair"] for row in native["steps"]} == {0, 1, 2}
+    assert {row["suggestion"] for row in native["steps"]} == ({0, 1} if suggested else {-1})
 
     network = reference.Network(native["initial"])
     trace = reference.train(
@@ -118,11 +146,13 @@ def test_twenty_steps_give_the_losses_and_weights_of_the_reference(pairs, torch_
             assert np.linalg.norm(ours - theirs) <= TOLERANCE * learnt, f"layer {layer} {name}"
 
 
-@pytest.mark.parametrize("kind", ["rotation", "spectral"])
-def test_the_comparison_notices_another_loss_weight(pairs, torch_pairs, kind, monkeypatch):
-    """The trace test is worth something only if a small change of the training fails it."""
-    native = native_run(pairs, kind)
-    monkeypatch.setattr(reference, "LOSS_WEIGHTS", (1.0, 10.0, 2.1))
+@KINDS
+def test_the_comparison_notices_another_loss_weight(
+    pairs, torch_pairs, kind, suggested, monkeypatch
+):
+    """The trace test is worth something only if another training fails it."""
+    native = native_run(pairs, kind, suggested)
+    monkeypatch.setattr(reference, "LOSS_WEIGHTS", (1.0, 10.0, 4.0))
     trace = reference.train(
         torch_pairs,
         reference.Network(native["initial"]),

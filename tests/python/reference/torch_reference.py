@@ -99,23 +99,47 @@ class Surface:
 
 
 class Pair:
-    """A source, its target in the source's units, and the coarse signal between them."""
+    """A source, its target in the source's units, and the coarse signal between them.
 
-    def __init__(self, source: np.ndarray, faces: np.ndarray, target: np.ndarray):
+    suggestions: (vertices (n, 3), held (k,)) each, what edits of the pair start from.
+    """
+
+    def __init__(
+        self, source: np.ndarray, faces: np.ndarray, target: np.ndarray, suggestions: list = ()
+    ):
         self.source = Surface(source, faces)
         self.other = Surface(target, faces)
         self.target = torch.from_numpy(np.asarray(target, np.float64)) / self.source.scale
+        self.suggestions = [
+            (torch.from_numpy(vertices) / self.source.scale, torch.from_numpy(held).long())
+            for vertices, held in suggestions
+        ]
 
-    def signal(self, kind: str, eigenfunctions: int) -> Tensor:
+    def signal(self, kind: str, eigenfunctions: int, suggestion: int) -> Tensor:
         """(m, 3, 3): closest rotations, or Jacobians to the spectrally projected target."""
         if kind == "spectral":
             coarse = self.other.project(self.target, eigenfunctions)
             coarse = self.source.project(coarse, eigenfunctions)
             return self.source.jacobians(coarse)
-        left, _, right = torch.linalg.svd(self.source.jacobians(self.target))
+        moved = self.target if suggestion < 0 else self.suggestions[suggestion][0]
+        left, _, right = torch.linalg.svd(self.source.jacobians(moved))
         sign = torch.det(left @ right)
         middle = torch.diag_embed(torch.stack([torch.ones_like(sign)] * 2 + [sign], dim=1))
         return left @ middle @ right
+
+    def recover(self, predicted: Tensor, suggestion: int) -> tuple[Tensor, Tensor]:
+        """(n, 3) the embedding of (m, 3, 3) Jacobians, and the target as it is compared with it."""
+        surface = self.source
+        if suggestion < 0:
+            return surface.poisson @ predicted.reshape(-1, 3), surface.centring @ self.target
+        held = self.suggestions[suggestion][1]
+        free = torch.ones(len(self.target), dtype=torch.bool)
+        free[held] = False
+        known = surface.laplacian[free][:, held] @ self.target[held]
+        divergence = (surface.divergence @ predicted.reshape(-1, 3))[free]
+        embedding = self.target.clone()
+        embedding[free] = torch.linalg.solve(surface.laplacian[free][:, free], divergence - known)
+        return embedding, self.target
 
 
 class Network(torch.nn.Module):
@@ -146,12 +170,12 @@ class Network(torch.nn.Module):
         return x[surface.faces].mean(dim=1).reshape(-1, 3, 3)
 
 
-def losses(pair: Pair, predicted: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+def losses(pair: Pair, predicted: Tensor, suggestion: int) -> tuple[Tensor, Tensor, Tensor]:
     """The Jacobian, position and integrated-Jacobian terms, before weighting."""
     surface = pair.source
     truth = surface.jacobians(pair.target)
-    embedding = surface.poisson @ predicted.reshape(-1, 3)
-    away = embedding - surface.centring @ pair.target
+    embedding, target = pair.recover(predicted, suggestion)
+    away = embedding - target
     integrated = surface.jacobians(embedding) - truth
     return (
         (surface.areas * ((predicted - truth) ** 2).sum(dim=(1, 2))).sum(),
@@ -171,7 +195,7 @@ def train(
     last: float,
     total: int,
 ) -> list[tuple[float, float, float, float]]:
-    """One Adam step for each row of `schedule` (its pair and number of eigenfunctions).
+    """One Adam step for each row of `schedule`: its pair, suggestion and number of eigenfunctions.
 
     The learning rate falls from `first` to `last` by the same factor over `total` steps.
     Returns the weighted loss and its three terms before each step.
@@ -183,8 +207,8 @@ def train(
         for group in adam.param_groups:
             group["lr"] = first * (last / first) ** (number / (total - 1))
         adam.zero_grad()
-        signal = pair.signal(kind, row["eigenfunctions"])
-        terms = losses(pair, network(pair.source, signal, eigenfunctions))
+        signal = pair.signal(kind, row["eigenfunctions"], row["suggestion"])
+        terms = losses(pair, network(pair.source, signal, eigenfunctions), row["suggestion"])
         loss = sum(weight * term for weight, term in zip(LOSS_WEIGHTS, terms, strict=True))
         loss.backward()
         adam.step()
