@@ -75,7 +75,7 @@ def test_vertex_in_two_handles():
     bpy.ops.supple.handles_from_groups(groups="head,feet")
     refuse(match, bpy.ops.supple.handles_from_groups, groups="top")
     bar.vertex_groups["feet"].add([201], 1.0, "REPLACE")
-    refuse("vertices are in both", bpy.ops.supple.bake, name="Wave")
+    refuse("1 vertex is in both", bpy.ops.supple.bake, name="Wave")
 
 
 def test_no_handles():
@@ -93,7 +93,7 @@ def test_no_faces():
 def test_not_a_number():
     bar = with_handles()
     bar.data.vertices[7].co.x = float("nan")
-    with pytest.raises(RuntimeError, match=r"1 vertices have a position .*vertex 7"):
+    with pytest.raises(RuntimeError, match=r"1 vertex has a position .*vertex 7"):
         bpy.ops.supple.bake(name="Wave")
     assert bar.data.shape_keys is None
 

@@ -219,7 +219,7 @@ def test_wrong_job_files_are_refused(addon, folder, capfd, old, new, message):
         ({"feet": [0, -1], "head": [5]}, "has vertex -1"),
         ({"feet": [0.5], "head": [5]}, "'feet' in .* must be a list of integers"),
         ({"feet": [], "head": [5]}, "vertex group 'feet' has no vertices"),
-        ({"feet": [5, 6], "head": [5]}, "1 vertices are in both 'feet' and 'head'"),
+        ({"feet": [5, 6], "head": [5]}, "1 vertex is in both 'feet' and 'head'"),
         ([1, 2], "must hold"),
     ],
 )

@@ -13,7 +13,7 @@ them from Blender's main thread.
 import bpy
 
 from . import handles, mesh_data, native, pose, shape_keys
-from .errors import UserError
+from .errors import UserError, count
 from .stages import Stages
 
 __all__ = [
@@ -90,7 +90,8 @@ def check_mesh(obj):
     rest = rest_mesh(obj)
     found = pose.check(rest)
     if rest.ngons:
-        found.append(f"{rest.ngons} faces have more than 4 corners; they are split into triangles.")
+        faces = count(rest.ngons, "face has", "faces have")
+        found.append(f"{faces} more than 4 corners; split into triangles.")
     return found
 
 

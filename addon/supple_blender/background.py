@@ -14,6 +14,12 @@ from .stages import Stages
 
 TICK_SECONDS = 0.05
 
+# Looking around changes nothing, so it goes on during the work; every other event waits.
+NAVIGATION = {
+    *("MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE"),
+    *("TRACKPADPAN", "TRACKPADZOOM", "NDOF_MOTION"),
+}
+
 # The Stages of the operator that runs in the window, for the panel; None when none does.
 running = None
 
@@ -87,6 +93,8 @@ class LongOperator:
     def modal(self, context, event):
         if event.type == "ESC" and event.value == "PRESS":
             self._stages.cancel()
+        if event.type in NAVIGATION:
+            return {"PASS_THROUGH"}
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
         if self._worker.is_alive():

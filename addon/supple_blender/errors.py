@@ -10,6 +10,11 @@ class CancelledError(Exception):
     """The user pressed Esc; nothing was written."""
 
 
+def count(number, one, many):
+    """Return the number with its noun: '1 vertex', '2,000 vertices'."""
+    return f"{number:,} {one if number == 1 else many}"
+
+
 def some(names, limit=3):
     """Return `names` as text, quoted, cut after `limit`."""
     names = list(names)

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from .errors import UserError, some
+from .errors import UserError, count, some
 
 # Painted groups fade out and overlap; a vertex is in a handle from this weight on.
 MIN_WEIGHT = 0.5
@@ -41,8 +41,9 @@ def require_members(object_name, vertices_by_name):
         first = vertices[counts > 1][0]
         one, other = [name for name in vertices_by_name if first in vertices_by_name[name]][:2]
         shared = np.intersect1d(vertices_by_name[one], vertices_by_name[other])
+        what = count(len(shared), "vertex is", "vertices are")
         raise UserError(
-            f"{object_name}: {len(shared)} vertices are in both '{one}' and '{other}' (first: "
+            f"{object_name}: {what} in both '{one}' and '{other}' (first: "
             f"vertex {first}). Remove them from one of the two groups, or use only one of them "
             "as a handle."
         )

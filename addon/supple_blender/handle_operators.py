@@ -5,7 +5,7 @@ import bpy
 from bpy.props import StringProperty
 
 from . import handles, shape_keys
-from .errors import UserError, some
+from .errors import UserError, count, some
 from .pose_operators import active_body
 
 
@@ -49,7 +49,7 @@ class SUPPLE_OT_handles_from_groups(HandleOperator, bpy.types.Operator):
         held = _names(self.held) or None
         added, left_out = handles.create(context, obj, _names(self.groups), held)
         obj.supple.active_handle = len(obj.supple.handles) - 1
-        text = f"{obj.name}: {len(added)} handles added"
+        text = f"{obj.name}: {count(len(added), 'handle', 'handles')} added"
         if left_out:
             return "WARNING", f"{text}; left out, with no vertices: {some(left_out)}"
         return "INFO", text

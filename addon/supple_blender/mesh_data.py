@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from . import compat, space
-from .errors import UserError
+from .errors import UserError, count
 
 
 @dataclass(frozen=True)
@@ -110,14 +110,15 @@ def collect(obj, world):
     positions = rest_positions(obj)
     bad = np.flatnonzero(~np.isfinite(positions).all(axis=1))
     if len(bad):
+        what = count(len(bad), "vertex has", "vertices have")
         raise UserError(
-            f"{obj.name}: {len(bad)} vertices have a position that is not a number (first: vertex "
-            f"{bad[0]}). Delete or move them in Edit Mode."
+            f"{obj.name}: {what} a position that is not a number (first: vertex {bad[0]}). "
+            "Delete or move them in Edit Mode."
         )
     triangles = _triangles(obj.data)
     if not len(triangles):
         raise UserError(
-            f"{obj.name}: the mesh has no faces ({len(positions)} vertices). "
+            f"{obj.name}: the mesh has no faces ({count(len(positions), 'vertex', 'vertices')}). "
             "Supple poses surfaces; add faces in Edit Mode."
         )
     stretch = space.solve_stretch(world, obj.name)

@@ -5,7 +5,7 @@ import textwrap
 
 import bpy
 
-from . import background, compat, handles, native, shape_keys, status
+from . import background, compat, handles, native, status
 from .handle_operators import (
     SUPPLE_OT_handle_remove,
     SUPPLE_OT_handle_select,
@@ -102,15 +102,15 @@ class SUPPLE_PT_pose(_Sidebar, bpy.types.Panel):
     def _draw_key(self, layout, obj):
         name = obj.supple.key_name
         keys = obj.data.shape_keys
-        taken = bool(keys and name in keys.key_blocks) and not shape_keys.made(obj, name)
         row = layout.row()
         row.prop(obj.supple, "key_name", text="Key")
         column = layout.column(align=True)
         column.operator(SUPPLE_OT_solve.bl_idname)
         bake = column.operator(SUPPLE_OT_bake.bl_idname, text="Bake")
         bake.name = name
-        if taken:
-            _draw_text(layout, f"'{name}' is not Supple's; it will not be overwritten", "INFO")
+        bake.overwrite = obj.supple.overwrite
+        if keys and name in keys.key_blocks:
+            layout.prop(obj.supple, "overwrite", text=f"Overwrite '{name}'")
 
 
 _CLASSES = (SUPPLE_UL_handles, SUPPLE_PT_mesh, SUPPLE_PT_pose)

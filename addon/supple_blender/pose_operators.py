@@ -115,7 +115,9 @@ class SUPPLE_OT_bake(PoseOperator, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     name: StringProperty(
-        name="Shape Key", description="The key to write; empty for the one named in the panel"
+        name="Shape Key",
+        description="The key to write; empty for the one named in the panel",
+        options={"SKIP_SAVE"},
     )
     overwrite: BoolProperty(
         name="Overwrite",

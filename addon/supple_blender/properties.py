@@ -70,6 +70,10 @@ class SUPPLE_PG_body(bpy.types.PropertyGroup):
     key_name: StringProperty(
         name="Shape Key", description="The shape key that Bake writes", default="Pose 1"
     )
+    overwrite: BoolProperty(
+        name="Overwrite",
+        description="Let the next Bake write over a key that Supple did not make",
+    )
 
 
 _CLASSES = (SUPPLE_PG_handle, SUPPLE_PG_key, SUPPLE_PG_body)

@@ -20,11 +20,6 @@ def _find(obj, name):
     return keys.key_blocks.get(name) if keys else None
 
 
-def made(obj, name):
-    """Return whether Supple wrote a key of this name; somebody may have changed it since."""
-    return name in obj.supple.keys
-
-
 def is_ours(obj, name):
     """Return whether Supple wrote shape key `name` and nobody changed its shape since."""
     key, record = _find(obj, name), obj.supple.keys.get(name)
@@ -88,6 +83,7 @@ def write(obj, name, positions):
         return
     _remove_preview(obj)
     _write(obj, name, positions)
+    obj.supple.overwrite = False  # meant for one bake
     obj.supple.made_basis = False  # a baked key needs it: it is the user's from now on
 
 

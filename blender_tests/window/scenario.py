@@ -24,6 +24,7 @@ GROUPS = (887, 473)
 KEY_NAME = (950, 421)
 PREVIEW = (931, 395)
 BAKE = (931, 374)
+OVERWRITE = (860, 348)
 
 
 def say(text):
@@ -128,6 +129,30 @@ def preview_and_undo(robot):
     say("Preview added its key and Ctrl+Z took exactly that back")
 
 
+def overwrite_only_when_told(robot):
+    smile = bar().shape_key_add(name="Smile")
+    bar().supple.key_name = "Smile"
+    before = bodies.key(bar(), "Smile")
+    assert smile.value in (0, 1)
+    bpy.ops.ed.undo_push(message="Smile")
+    yield from robot.wait(0.5)
+    yield from robot.click(*BAKE)
+    yield from robot.wait(2)
+    assert np.array_equal(bodies.key(bar(), "Smile"), before)
+    robot.screenshot("refused.png")
+    yield from robot.move(*robot.middle_of_view())  # off the message, which then goes
+    yield from robot.wait(0.5)
+    yield from robot.click(*OVERWRITE)
+    yield from robot.wait_for(lambda: bar().supple.overwrite, 2, "Overwrite switched on")
+    yield from robot.click(*BAKE)
+    yield from robot.wait_for(lambda: not bar().supple.overwrite, 30, "the bake over Smile")
+    assert not np.array_equal(bodies.key(bar(), "Smile"), before)
+    for _ in range(3):
+        yield from undo(robot)
+    assert key_names(bar()) == ["Basis", "Pose 1"], key_names(bar())
+    say("A key of another maker was refused, and written once Overwrite was on")
+
+
 def bake_in_edit_mode(robot):
     bpy.context.view_layer.objects.active = bar()
     bar().select_set(True)
@@ -199,6 +224,7 @@ def scenario(robot):
         bake,
         undo_step_by_step,
         preview_and_undo,
+        overwrite_only_when_told,
         bake_in_edit_mode,
         handles_in_edit_mode,
         cancel_long_work,
