@@ -10,11 +10,12 @@ namespace {
 
 using Network = LocalJacobianNetwork<float>;
 
-EditOptions edit_options(const std::string& mode, int rounds, int passes, bool network,
-                         bool loose_pieces_follow) {
+EditOptions edit_options(const std::string& mode, int rounds, int network_rounds, int passes,
+                         bool network, bool loose_pieces_follow) {
   EditOptions options;
   options.mode = edit_mode(mode);
   options.rounds = rounds < 0 ? options.rounds : rounds;
+  options.network_rounds = network_rounds < 0 ? options.network_rounds : network_rounds;
   options.passes = passes < 0 ? options.passes : passes;
   options.network = network;
   options.loose_pieces = loose_pieces_follow ? LoosePieces::follow : LoosePieces::stay;
@@ -72,16 +73,17 @@ void bind_tasks(py::module_& module) {
       .def(
           "solve",
           [](const Editor& editor, const std::vector<HandleTarget>& targets,
-             const std::string& mode, int rounds, int passes, bool network,
+             const std::string& mode, int rounds, int network_rounds, int passes, bool network,
              bool loose_pieces_follow, Progress* progress) {
             EditResult result = editor.solve(
-                targets, edit_options(mode, rounds, passes, network, loose_pieces_follow),
+                targets,
+                edit_options(mode, rounds, network_rounds, passes, network, loose_pieces_follow),
                 range(progress).stage("solving", 0.0, 1.0));
             return std::make_pair(std::move(result.vertices), result.report);
           },
           py::arg("targets"), py::arg("mode") = "natural", py::arg("rounds") = -1,
-          py::arg("passes") = -1, py::arg("network") = true, py::arg("loose_pieces_follow") = true,
-          py::arg("progress") = nullptr, NoGil());
+          py::arg("network_rounds") = -1, py::arg("passes") = -1, py::arg("network") = true,
+          py::arg("loose_pieces_follow") = true, py::arg("progress") = nullptr, NoGil());
 
   module.def(
       "deform",

@@ -241,6 +241,7 @@ class Editor:
         targets: collections.abc.Sequence[HandleTarget],
         mode: str = "natural",
         rounds: typing.SupportsInt | typing.SupportsIndex = -1,
+        network_rounds: typing.SupportsInt | typing.SupportsIndex = -1,
         passes: typing.SupportsInt | typing.SupportsIndex = -1,
         network: bool = True,
         loose_pieces_follow: bool = True,

@@ -99,6 +99,7 @@ class Editor:
         *,
         mode: str = "natural",
         rounds: int | None = None,
+        network_rounds: int | None = None,
         passes: int | None = None,
         network: bool = True,
         loose_pieces: str = "follow",
@@ -110,7 +111,8 @@ class Editor:
             handles: the same handles, in order, with new targets; None for those given before.
             mode: "natural" ends with the network's Jacobians, "stiff" with passes towards least
                 distortion.
-            rounds: of signal, network and Poisson solve; None for the default.
+            rounds: of closest rotations and Poisson solve; None for the default, 3.
+            network_rounds: how many of them, the last ones, use the network; None for 1.
             passes: of closest rotations and Poisson solve, "stiff" only; None for the default.
             network: False replaces it by the identity.
             loose_pieces: "follow" or "stay": what components without a handle do.
@@ -132,13 +134,18 @@ class Editor:
             raise SuppleError(
                 "bad_option", f"loose_pieces is '{loose_pieces}'; use 'follow' or 'stay'."
             )
-        for name, value in (("rounds", rounds), ("passes", passes)):
+        for name, value in (
+            ("rounds", rounds),
+            ("network_rounds", network_rounds),
+            ("passes", passes),
+        ):
             if value is not None and value < 0:
                 raise SuppleError("bad_option", f"{name} is {value}; it must be 0 or more.")
         vertices, report = self._native.solve(
             [handle._native_target() for handle in current],
             mode,
             -1 if rounds is None else rounds,
+            -1 if network_rounds is None else network_rounds,
             -1 if passes is None else passes,
             network,
             loose_pieces == "follow",

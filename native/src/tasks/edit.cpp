@@ -196,7 +196,7 @@ void Editor::follow_loose_pieces(Points& moved, const MatrixField& vertex_jacobi
 EditResult Editor::solve(const std::vector<HandleTarget>& targets, const EditOptions& options,
                          ProgressRange progress) const {
   check_targets(handles_, targets);
-  if (options.rounds < 0 || options.passes < 0) {
+  if (options.rounds < 0 || options.passes < 0 || options.network_rounds < 0) {
     throw Error(ErrorCode::bad_option, "Rounds and passes must be 0 or more.");
   }
   const TriangleMesh& mesh = prepared_->mesh;
@@ -219,14 +219,16 @@ EditResult Editor::solve(const std::vector<HandleTarget>& targets, const EditOpt
   Points moved = suggestion(targets, held);
   result.report.suggestion_milliseconds = total.milliseconds();
 
-  const bool with_network = options.network && network_ != nullptr;
+  const bool with_network =
+      options.network && network_ != nullptr && options.rounds > 0 && options.network_rounds > 0;
   const int passes = options.mode == EditMode::stiff ? options.passes : 0;
   const Stopwatch rounds_watch;
   for (int round = 0; round < options.rounds; ++round) {
     progress.report(static_cast<double>(round) / (options.rounds + passes));
     const Signal signal = rotation_signal(operators.jacobians_of(moved));
+    const bool use_network = with_network && round + options.network_rounds >= options.rounds;
     const MatrixField jacobians =
-        with_network ? network_->forward(*context_, signal) : signal.fields.front();
+        use_network ? network_->forward(*context_, signal) : signal.fields.front();
     moved = poisson_->solve(operators.divergence_of(jacobians), held);
   }
   result.report.rounds_milliseconds = rounds_watch.milliseconds();

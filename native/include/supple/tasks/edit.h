@@ -41,7 +41,10 @@ enum class LoosePieces {
 
 struct EditOptions {
   EditMode mode = EditMode::natural;
-  int rounds = 3;   ///< of signal, network, Poisson
+  int rounds = 3;  ///< of closest rotations and Poisson
+  /// How many of the rounds, the last ones, put the network in between. It is trained on what
+  /// rounds without it leave, not on its own results.
+  int network_rounds = 1;
   int passes = 40;  ///< of closest rotations, Poisson, after the rounds; `stiff` only
   bool network = true;
   LoosePieces loose_pieces = LoosePieces::follow;
