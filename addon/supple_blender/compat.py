@@ -35,6 +35,18 @@ def add_key(obj, name):
     return key
 
 
+def new_world(name):
+    """Add a world with a node tree and return it."""
+    world = bpy.data.worlds.new(name)
+    if bpy.app.version < (
+        5,
+        0,
+        0,
+    ):  # from 5.0 on it has one anyway, and asking for it is deprecated
+        world.use_nodes = True
+    return world
+
+
 def draw_progress(layout, fraction, text):
     """Draw a progress bar, or its text where Blender has no bar (before 4.0)."""
     if hasattr(layout, "progress"):

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from . import handles, space
+from . import compat, handles, space
 from .errors import UserError
 
 # From the front, a little from its left and above, as portraits are taken.
@@ -51,8 +51,7 @@ def _add_light(scene):
     light.data.energy = 2.0
     light.rotation_euler = Vector((0.6, -1.0, 1.2)).to_track_quat("Z", "Y").to_euler()
     scene.collection.objects.link(light)
-    scene.world = bpy.data.worlds.new("Supple World")
-    scene.world.use_nodes = True
+    scene.world = compat.new_world("Supple World")
     scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (*BACKGROUND, 1.0)
     scene.world.color = BACKGROUND
 
