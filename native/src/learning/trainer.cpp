@@ -57,11 +57,11 @@ struct Trainer<Scalar>::Example {
       throw Error(ErrorCode::wrong_shape,
                   "Pair " + std::to_string(index) + " has vertices attached on one side only.");
     }
-    target.resize(operators.vertices.rows(), 3);
-    for (Eigen::Index i = 0; i < target.rows(); ++i) {
-      target.row(i) = pair.target.row(mesh.mesh_vertex()[i]);
-    }
-    target = mesh.to_surface(target);
+    // The spectral signal is taken between sides of area 1, as `deform` does; an edit keeps its
+    // size.
+    target = options.architecture.signal == SignalKind::spectral
+                 ? moved.surface_vertices()
+                 : mesh.to_surface(moved.from_surface(moved.surface_vertices()));
     poisson = std::make_unique<FreePoisson>(operators.laplacian, operators.mass,
                                             operators.component, operators.component_count);
     // One more than is used: where to cut is read from the gap above.
@@ -123,7 +123,7 @@ struct Trainer<Scalar>::Example {
 
   TriangleMesh mesh;
   SurfaceOperators operators;
-  Points target;  // surface units of the source
+  Points target;  // surface units: the source's, or its own for the spectral signal
   Eigenbasis basis, target_basis;
   std::unique_ptr<FreePoisson> poisson;
   std::unique_ptr<NetworkContext<Scalar>> context;

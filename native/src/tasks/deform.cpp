@@ -32,7 +32,8 @@ Points deform(const PreparedMesh& prepared, const Points& target, int count,
       eigenbasis(target_operators.laplacian, target_operators.mass, {.count = count + 1},
                  progress.stage("eigenbasis of the target", 0.0, 0.8));
 
-  const Points truth = mesh.to_surface(target_mesh.from_surface(target_mesh.surface_vertices()));
+  // Both sides have area 1 inside, so that a network never sees a difference of size.
+  const Points& truth = target_mesh.surface_vertices();
   const Eigen::Index cut = stable_count(prepared.basis, target_basis, count);
   const Points coarse = spectral_target(prepared.basis, target_basis, truth, cut);
   const Signal signal = spectral_signal(source, prepared.basis, coarse, cut);
@@ -42,7 +43,8 @@ Points deform(const PreparedMesh& prepared, const Points& target, int count,
   const FreePoisson poisson(source.laplacian, source.mass, source.component,
                             source.component_count);
   const Points centred = poisson.solve(source.divergence_of(predicted));
-  const Points moved = centred + (truth - poisson.centred(truth));
+  const Points placed = centred + (truth - poisson.centred(truth));
+  const Points moved = mesh.to_surface(target_mesh.from_surface(placed));
   progress.report(1.0);
   return mesh.scatter(moved, source.average * source.jacobians_of(moved));
 }
