@@ -27,23 +27,33 @@ class Equivariance : public ::testing::TestWithParam<Kind> {
   }
 };
 
-TEST_P(Equivariance, OfTheJacobians) {
-  const test::RestMesh<float> rest(mesh(), kEigenfunctions, 200);
+template <class Scalar>
+void expect_turned(const zoo::Mesh& mesh, const Architecture& architecture, double strength,
+                   double tolerance, Eigen::Index samples = 200) {
+  const int functions = architecture.eigenfunctions;
+  const test::RestMesh<Scalar> rest(mesh, functions, samples);
   const Points target = test::bent(rest.operators.vertices);
-  const Signal signal = test::signal_of(kind(), rest, target, 30);
-  const auto network = test::awake_network<float>(architecture(), 5, rest.context, signal, 0.2);
+  const Signal signal = test::signal_of(architecture.signal, rest, target, 30);
+  const auto network = test::awake_network<Scalar>(architecture, 5, rest.context, signal, strength);
   const MatrixField answer = network.forward(rest.context, signal);
-  ASSERT_GT((answer - signal.fields.back()).norm(), 0.01 * answer.norm()) << "network asleep";
+  ASSERT_GT((answer - signal.fields.back()).norm(), 1e-3 * answer.norm()) << "network asleep";
   for (uint64_t which = 0; which < 3; ++which) {
     const Matrix3 r1 = test::rotation(which), r2 = test::rotation(which + 3);
-    const test::RestMesh<float> other({mesh().vertices * r1, mesh().faces}, kEigenfunctions, 200);
-    const Signal other_signal = test::signal_of(kind(), other, target * r2, 30);
+    const test::RestMesh<Scalar> other({mesh.vertices * r1, mesh.faces}, functions, samples);
+    const Signal other_signal = test::signal_of(architecture.signal, other, target * r2, 30);
     const MatrixField expected = turned(answer, r1, r2);
     const MatrixField got = network.forward(other.context, other_signal);
-    EXPECT_LT((got - expected).norm(), 1e-4 * expected.norm());
-    EXPECT_LT((got - expected).cwiseAbs().maxCoeff(), 1e-4 * expected.cwiseAbs().maxCoeff());
+    EXPECT_LT((got - expected).norm(), tolerance * expected.norm()) << "rotation " << which;
   }
 }
+
+// The mathematics: what is left is rounding of the eigenfunctions.
+TEST_P(Equivariance, InDouble) { expect_turned<double>(mesh(), architecture(), 0.2, 1e-6); }
+TEST_P(Equivariance, InDoubleAtEveryVertex) {
+  expect_turned<double>(mesh(), architecture(), 0.2, 1e-6, 0);
+}
+// The precision of use. Random weights magnify rounding more than trained ones, so they are weak.
+TEST_P(Equivariance, InFloat) { expect_turned<float>(mesh(), architecture(), 0.05, 1e-4); }
 
 TEST_P(Equivariance, ASignalOfOneRotationComesBackAsItIs) {
   if (kind() != SignalKind::rotation) {

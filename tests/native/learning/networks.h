@@ -57,9 +57,11 @@ LocalJacobianNetwork<Scalar> awake_network(const Architecture& architecture, uin
   const Eigen::RowVectorXd mean = raw.colwise().mean();
   const Eigen::RowVectorXd deviation =
       (raw.rowwise() - mean).colwise().norm() / std::sqrt(static_cast<double>(raw.rows()));
+  // One mesh hardly varies where a training set does; its smallest deviations must not be blown up.
+  constexpr double kFloor = 0.1;
   network.set_normalisation(
       Row(mean.template cast<Scalar>()),
-      Row((deviation.array() + 1e-3).inverse().matrix().template cast<Scalar>()));
+      Row((deviation.array() + kFloor).inverse().matrix().template cast<Scalar>()));
   return network;
 }
 

@@ -18,7 +18,7 @@ class Deform : public ::testing::TestWithParam<zoo::Entry> {
     const Points target = test::bent(rest.operators.vertices);
     return test::awake_network<float>(
         {.signal = SignalKind::spectral, .eigenfunctions = 64, .width = 32}, 5, rest.context,
-        test::signal_of(SignalKind::spectral, rest, target, kCount), 0.2);
+        test::signal_of(SignalKind::spectral, rest, target, kCount), 0.05);
   }
   void expect_turned(const LocalJacobianNetwork<float>* network, double tolerance) const {
     const Points target = test::bent(mesh().vertices);

@@ -212,13 +212,5 @@ TEST_F(LooseEditor, StayLeavesThem) {
   EXPECT_LT(test::farthest(loose(got), loose(mesh.vertices)), 1e-12);
 }
 
-TEST_F(LooseEditor, TheRestDoesNotSeeThem) {
-  const Editor both(prepared, edit.handles, nullptr);
-  const Editor alone(test::prepared(zoo::icosphere(2)), edit.handles, nullptr);
-  EXPECT_LT(test::farthest(both.solve(edit.targets).vertices.topRows(162),
-                           alone.solve(edit.targets).vertices),
-            1e-9);
-}
-
 }  // namespace
 }  // namespace supple
