@@ -116,6 +116,12 @@ def test_empty_scaled_to_zero():
     refuse("Bar: the Empty 'head' of handle 'head' is scaled to 0", bpy.ops.supple.bake, name="W")
 
 
+def test_empty_scaled_to_infinity():
+    with_handles()
+    bpy.data.objects["head"].scale.x = float("inf")
+    refuse("Empty 'head' of handle 'head' is scaled to 0 or", bpy.ops.supple.bake, name="W")
+
+
 def test_object_scaled_to_zero():
     bar = with_handles()
     bar.scale.y = 0
@@ -167,6 +173,17 @@ def test_linked_mesh(tmp_path):
 def test_removing_a_handle_that_is_not_there():
     with_handles()
     refuse("Bar: there is no handle 'tail'", bpy.ops.supple.handle_remove, name="tail")
+
+
+def test_cancelled_work_changes_nothing(addon):
+    with_handles()
+    stages = addon("stages").Stages()
+    stages.cancel()
+    addon("prepared").clear()
+    before = bodies.everything()
+    with pytest.raises(addon("api").CancelledError):
+        addon("api").bake(bpy.data.objects["Bar"], "Wave", stages=stages)
+    assert bodies.everything() == before
 
 
 def test_errors_of_the_native_part_name_the_object(addon, monkeypatch):

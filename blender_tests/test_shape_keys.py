@@ -132,6 +132,19 @@ def test_preview_that_the_user_changed_is_kept(bar):
     assert [k.name for k in bar.data.shape_keys.key_blocks] == ["Basis", "Supple Preview"]
 
 
+def test_a_foreign_preview_is_not_overwritten(bar):
+    add_user_keys(bar)
+    bar.shape_key_add(name="Supple Preview")
+    with pytest.raises(RuntimeError, match="Rename or remove it"):
+        bpy.ops.supple.solve()
+
+
+def test_a_name_too_long_for_blender_is_refused(bar):
+    bpy.ops.supple.bake(name="x" * 63)
+    with pytest.raises(RuntimeError, match="at most 63 bytes"):
+        bpy.ops.supple.bake(name="x" * 64)
+
+
 def test_saved_and_opened_again(bar, tmp_path):
     bpy.ops.supple.bake(name="Wave")
     baked = bodies.key(bar, "Wave")

@@ -6,17 +6,19 @@
     bpy.data.objects["hand.L"].location.z += 0.3
     api.bake(obj, "Wave")
 
-Every function raises `UserError` with one readable message and then leaves the file as it was. Call
-them from Blender's main thread.
+Every function raises `UserError` with one readable message and then leaves the file as it was.
+Where one takes `stages` (a `stages.Stages`), another thread may watch it and call its `cancel()`:
+then `CancelledError` is raised, and again nothing was changed. Call them from Blender's main thread.
 """
 
 import bpy
 
 from . import handles, mesh_data, native, pose, shape_keys
-from .errors import UserError, count
+from .errors import CancelledError, UserError, count
 from .stages import Stages
 
 __all__ = [
+    "CancelledError",
     "UserError",
     "bake",
     "check_mesh",

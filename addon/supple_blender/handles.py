@@ -122,7 +122,7 @@ def _place(obj, handle, bind):
 
 
 def _add_row(context, obj, name, world, positions, kind):
-    bind = space.bind_matrix(world, positions.mean(axis=0), obj.name)
+    bind = space.bind_matrix(world, positions.mean(axis=0))
     empty = bpy.data.objects.new(name, None)
     empty.empty_display_type = "CUBE" if kind == "HELD" else "SPHERE"
     points = space.to_world_points(world, positions)
@@ -221,7 +221,7 @@ def rebind(context, obj):
     for row in obj.supple.handles:
         if row.empty and row.empty.parent == obj:
             centroid = rest.positions[found[row.name]].mean(axis=0)
-            _place(obj, row, space.bind_matrix(world, centroid, obj.name))
+            _place(obj, row, space.bind_matrix(world, centroid))
     obj.supple.bound_vertices = len(rest.positions)
 
 
@@ -254,11 +254,10 @@ def _motion_matrix(context, obj, row, world):
         )
     motion = np.linalg.inv(world) @ space.as_array(evaluated.matrix_world)
     motion = motion @ np.linalg.inv(np.array(row.bind, dtype=np.float64).reshape(4, 4))
-    scales = np.linalg.svd(motion[:3, :3], compute_uv=False)
-    if not np.isfinite(scales).all() or scales[-1] <= space.MIN_SCALE_RATIO:
+    if space.is_flat(motion[:3, :3]):
         raise UserError(
-            f"{obj.name}: the Empty '{empty.name}' of handle '{row.name}' is scaled to 0. "
-            "Give it a scale other than 0 on X, Y and Z (Alt+S resets it)."
+            f"{obj.name}: the Empty '{empty.name}' of handle '{row.name}' is scaled to 0 or "
+            "infinity. Give it another scale on X, Y and Z (Alt+S resets it)."
         )
     return motion
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from . import native, space
 
-# A prepared mesh of 100,000 vertices takes about 0.5 GB; more than a few would not be met again.
+# Each takes more than a kilobyte a vertex; more than a few would hardly be met again.
 CAPACITY = 4
 
 

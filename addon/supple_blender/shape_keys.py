@@ -9,6 +9,7 @@ from . import compat, mesh_data
 from .errors import UserError
 
 PREVIEW = "Supple Preview"
+MAX_NAME_BYTES = 63
 
 
 def _digest(positions):
@@ -30,6 +31,11 @@ def require_free(obj, name, overwrite=False):
     """Raise UserError unless shape key `name` may be written on mesh object obj."""
     if not name.strip():
         raise UserError(f"{obj.name}: the shape key has no name. Give it one.")
+    if len(name.encode()) > MAX_NAME_BYTES:
+        raise UserError(
+            f"{obj.name}: the shape key name '{name}' is too long. "
+            f"Blender keeps at most {MAX_NAME_BYTES} bytes of it."
+        )
     keys = obj.data.shape_keys
     if keys and not keys.use_relative:
         raise UserError(
@@ -42,9 +48,11 @@ def require_free(obj, name, overwrite=False):
     if key == keys.reference_key:
         raise UserError(f"{obj.name}: '{name}' is the rest shape. Choose another name.")
     if not overwrite and not is_ours(obj, name):
+        fix = "Choose another name, or switch on Overwrite."
+        if name == PREVIEW:
+            fix = "Rename or remove it; previews take this name."
         raise UserError(
-            f"{obj.name}: shape key '{name}' was made or changed by someone else. "
-            "Choose another name, or switch on Overwrite."
+            f"{obj.name}: shape key '{name}' was made or changed by someone else. {fix}"
         )
 
 

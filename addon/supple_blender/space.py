@@ -22,26 +22,29 @@ def as_array(matrix):
     return np.array(matrix, dtype=np.float64)
 
 
-def _stretch(world, name):
-    """Return the symmetric S (3, 3) of the polar decomposition world = Q S."""
-    linear = world[:3, :3]
-    squared, axes = np.linalg.eigh(linear.T @ linear)
-    scales = np.sqrt(np.maximum(squared, 0.0))
-    if not np.isfinite(scales).all() or scales[0] <= MIN_SCALE_RATIO * scales[-1]:
-        raise UserError(
-            f"{name}: the object is scaled to zero along an axis. "
-            "Give it a scale other than 0 on X, Y and Z."
-        )
-    return (axes * scales) @ axes.T
+def is_flat(linear):
+    """Return whether a (3, 3) map flattens space, or is not finite."""
+    if not np.isfinite(linear).all():
+        return True
+    scales = np.linalg.svd(linear, compute_uv=False)
+    return scales[-1] <= MIN_SCALE_RATIO * scales[0]
 
 
 def solve_stretch(world, name):
-    """Return the (3, 3) map from local to solve space, with determinant 1.
+    """Return the (3, 3) map from local to solve space: S, scaled to determinant 1, of the polar
+    decomposition world = Q S.
 
     It is rounded, so that turning an object, which moves the last digits, leaves it as it was.
     Raises UserError for an object scaled to zero; `name` is the object's.
     """
-    stretch = _stretch(world, name)
+    linear = world[:3, :3]
+    if is_flat(linear):
+        raise UserError(
+            f"{name}: the object is scaled to zero along an axis. "
+            "Give it a scale other than 0 on X, Y and Z."
+        )
+    squared, axes = np.linalg.eigh(linear.T @ linear)
+    stretch = (axes * np.sqrt(squared)) @ axes.T
     stretch = np.round(stretch / np.cbrt(np.linalg.det(stretch)), 5)
     return np.eye(3) if np.abs(stretch - np.eye(3)).max() < 2e-5 else stretch
 
@@ -73,14 +76,12 @@ def to_world_points(world, points):
     return points @ world[:3, :3].T + world[:3, 3]
 
 
-def bind_matrix(world, centroid, name):
-    """Return the local (4, 4) frame of a handle at rest: at `centroid`, with the object's axes.
+def bind_matrix(world, centroid):
+    """Return the local (4, 4) frame of a handle at rest: at `centroid`, with the world's axes.
 
-    In world its axes are orthonormal and one unit long whatever the object's scale, so that turning
-    an Empty placed there turns the handle without shear.
+    An Empty placed there has axes one unit long whatever the object's scale, so that turning it
+    turns the handle without shear, and moving it along Z moves the handle up.
     """
-    rotation = world[:3, :3] @ np.linalg.inv(_stretch(world, name))
     frame = np.eye(4)
-    frame[:3, :3] = rotation * np.sign(np.linalg.det(rotation))
     frame[:3, 3] = to_world_points(world, centroid[None])[0]
     return np.linalg.inv(world) @ frame
