@@ -8,7 +8,7 @@
 
 Every function raises `UserError` with one readable message and then leaves the file as it was.
 Where one takes `stages` (a `stages.Stages`), another thread may watch it and call its `cancel()`:
-then `CancelledError` is raised, and again nothing was changed. Call them from Blender's main thread.
+then `CancelledError` is raised, and again nothing was changed. Call them from the main thread.
 """
 
 import bpy
