@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "supple/learning/losses.h"
 
+#include <vector>
+
 #include "native/gradient_check.h"
 #include "native/support.h"
 #include "supple/geometry/jacobians.h"
@@ -38,6 +40,30 @@ TEST_P(Loss, GradientOfEachTermAndOfAll) {
                                        test::values_of(std::as_const(analytic)), 60))
         << "weights " << weights.jacobian << " " << weights.position << " " << weights.integrated;
   }
+}
+
+TEST_P(Loss, GradientWithHeldVertices) {
+  // One vertex of each piece and a few more.
+  std::vector<int> held = {5, 6};
+  for (int c = 0; c < operators.component_count; ++c) {
+    int i = 0;
+    while (operators.component[i] != c) {
+      ++i;
+    }
+    held.push_back(i);
+  }
+  const HeldSystem system(
+      operators.laplacian,
+      Eigen::VectorXi::Map(held.data(), static_cast<Eigen::Index>(held.size())));
+  const auto total = [&](MatrixField* grad) {
+    return supervised_loss(operators, system, {}, target, predicted, grad).total;
+  };
+  MatrixField analytic;
+  total(&analytic);
+  EXPECT_TRUE(test::gradient_matches([&] { return total(nullptr); }, test::values_of(predicted),
+                                     test::values_of(std::as_const(analytic)), 60));
+  predicted = operators.jacobians_of(target);
+  EXPECT_LT(total(nullptr), 1e-16);
 }
 
 TEST_P(Loss, TheCheckerCatchesAMissingPoissonTerm) {

@@ -177,6 +177,62 @@ TEST_F(TrainerErrors, OptionsOutOfRange) {
   expect_bad([](TrainOptions& o) { o.architecture.configuration = Configuration::paper; });
 }
 
+class SuggestionErrors : public TrainerErrors {
+ protected:
+  SuggestionErrors() {
+    options = tiny_options(Configuration::equivariant, SignalKind::rotation);
+    pairs.resize(1);
+    pairs[0].suggestions = {{pairs[0].target, Eigen::Vector3i(0, 7, 9)}};
+  }
+  Suggestion& suggestion() { return pairs[0].suggestions[0]; }
+};
+
+TEST_F(SuggestionErrors, AnotherSize) {
+  suggestion().vertices.conservativeResize(5, 3);
+  EXPECT_TRUE(fails(ErrorCode::wrong_shape, {"pair 0", "5", "42"}));
+}
+
+TEST_F(SuggestionErrors, NotFinite) {
+  suggestion().vertices(4, 1) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(fails(ErrorCode::not_finite, {"pair 0"}));
+}
+
+TEST_F(SuggestionErrors, AHeldVertexOutOfRange) {
+  suggestion().held[1] = 42;
+  EXPECT_TRUE(fails(ErrorCode::index_out_of_range, {"pair 0", "42"}));
+}
+
+TEST_F(SuggestionErrors, AVertexHeldTwice) {
+  suggestion().held[1] = 9;
+  EXPECT_TRUE(fails(ErrorCode::overlapping_handles, {"9"}));
+}
+
+TEST_F(SuggestionErrors, NothingHeld) {
+  suggestion().held.resize(0);
+  EXPECT_TRUE(fails(ErrorCode::no_handles, {"pair 0"}));
+}
+
+TEST(TrainingFromSuggestions, DrawsThemAndReducesTheLoss) {
+  TrainOptions options = tiny_options(Configuration::equivariant, SignalKind::rotation);
+  options.epochs = 200;
+  TrainingPair pair = tiny_pairs()[0];
+  for (uint64_t i = 0; i < 3; ++i) {
+    const Points guess = pair.target + 0.1 * Points(test::noise(pair.target.rows(), 3, i));
+    pair.suggestions.push_back({guess, Eigen::Vector3i(0, 7, 9)});
+  }
+  Trainer<float> trainer({pair}, options);
+  std::set<int> drawn;
+  double first = 0.0, last = 0.0;
+  for (int step = 0; step < 200; ++step) {
+    const TrainStep result = trainer.step();
+    drawn.insert(result.suggestion);
+    first += step < 20 ? result.loss.total : 0.0;
+    last += step >= 180 ? result.loss.total : 0.0;
+  }
+  EXPECT_EQ(drawn, std::set<int>({0, 1, 2}));
+  EXPECT_LT(last, 0.9 * first);
+}
+
 TEST_F(TrainerErrors, Cancelled) {
   Progress progress;
   progress.cancel();
