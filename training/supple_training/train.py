@@ -198,18 +198,20 @@ def main(
         except (OSError, ValueError) as error:
             raise typer.BadParameter(str(error), param_hint="--data") from error
         source = f"{len(training)} pairs of the file {data.name}"
-    if signal is Signal.rotation:
-        training = with_suggestions(training, seed)
     unseen = pairs_with_progress(
         pair_settings(signal.value, pairs=held_out, seed=seed, held_out=True),
         cache,
         processes=processes,
     )
 
+    example = "one pair"
+    if signal is Signal.rotation:
+        training = with_suggestions(training, seed)
+        example = f"one of {SUGGESTIONS} edits of a pair by random handles"
     metadata = {
         "title": f"Supple Local Jacobian Network, {signal.value} signal",
         "training_data": source,
-        "training": f"{epochs} epochs, one pair a step, Adam 1e-3 to 1e-5",
+        "training": f"{epochs} epochs, {example} a step, Adam 1e-3 to 1e-5",
         "seed": str(seed),
         "licence": "GPL-3.0-or-later",
         "version": supple.__version__,
@@ -223,6 +225,7 @@ def main(
         metadata=metadata,
     )
     result.model.save(out)
+    out.chmod(0o644)  # safetensors leaves it to its owner alone
     steps = len(result.steps)
     cores = len(os.sched_getaffinity(0))
     console.print(

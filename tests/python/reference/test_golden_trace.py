@@ -74,8 +74,11 @@ def pairs() -> list[tuple]:
 
 
 @pytest.fixture(scope="module")
-def torch_pairs(pairs) -> list[reference.Pair]:
-    return [reference.Pair(*pair) for pair in pairs]
+def torch_pairs(pairs) -> dict[str, list[reference.Pair]]:
+    return {
+        kind: [reference.Pair(*pair, kind=kind) for pair in pairs]
+        for kind in ("rotation", "spectral")
+    }
 
 
 # The signal, and whether it is taken from suggestions, as the editing network is trained.
@@ -118,10 +121,9 @@ def test_twenty_steps_give_the_losses_and_weights_of_the_reference(
 
     network = reference.Network(native["initial"])
     trace = reference.train(
-        torch_pairs,
+        torch_pairs[kind],
         network,
         native["steps"],
-        kind=kind,
         eigenfunctions=EIGENFUNCTIONS,
         first=1e-3,
         last=1e-5,
@@ -154,14 +156,13 @@ def test_the_comparison_notices_another_loss_weight(
     native = native_run(pairs, kind, suggested)
     monkeypatch.setattr(reference, "LOSS_WEIGHTS", (1.0, 10.0, 4.0))
     trace = reference.train(
-        torch_pairs,
+        torch_pairs[kind],
         reference.Network(native["initial"]),
-        native["steps"][:3],
-        kind=kind,
+        native["steps"][:12],
         eigenfunctions=EIGENFUNCTIONS,
         first=1e-3,
         last=1e-5,
         total=7 * len(pairs),
     )
     assert trace[0][0] != pytest.approx(native["steps"][0]["loss"], rel=TOLERANCE)
-    assert trace[2][3] != pytest.approx(native["steps"][2]["integrated"], rel=TOLERANCE)
+    assert trace[11][3] != pytest.approx(native["steps"][11]["integrated"], rel=TOLERANCE)

@@ -99,25 +99,36 @@ class Surface:
 
 
 class Pair:
-    """A source, its target in the source's units, and the coarse signal between them.
+    """A source, its target, and the coarse signal between them.
 
+    For kind "rotation" the target is in the source's units; for "spectral" both have area 1.
     suggestions: (vertices (n, 3), held (k,)) each, what edits of the pair start from.
     """
 
     def __init__(
-        self, source: np.ndarray, faces: np.ndarray, target: np.ndarray, suggestions: list = ()
+        self,
+        source: np.ndarray,
+        faces: np.ndarray,
+        target: np.ndarray,
+        suggestions: list = (),
+        *,
+        kind: str,
     ):
+        self.kind = kind
         self.source = Surface(source, faces)
         self.other = Surface(target, faces)
-        self.target = torch.from_numpy(np.asarray(target, np.float64)) / self.source.scale
+        if kind == "spectral":
+            self.target = self.other.vertices
+        else:
+            self.target = torch.from_numpy(np.asarray(target, np.float64)) / self.source.scale
         self.suggestions = [
             (torch.from_numpy(vertices) / self.source.scale, torch.from_numpy(held).long())
             for vertices, held in suggestions
         ]
 
-    def signal(self, kind: str, eigenfunctions: int, suggestion: int) -> Tensor:
+    def signal(self, eigenfunctions: int, suggestion: int) -> Tensor:
         """(m, 3, 3): closest rotations, or Jacobians to the spectrally projected target."""
-        if kind == "spectral":
+        if self.kind == "spectral":
             coarse = self.other.project(self.target, eigenfunctions)
             coarse = self.source.project(coarse, eigenfunctions)
             return self.source.jacobians(coarse)
@@ -189,7 +200,6 @@ def train(
     network: Network,
     schedule: list[dict],
     *,
-    kind: str,
     eigenfunctions: int,
     first: float,
     last: float,
@@ -207,7 +217,7 @@ def train(
         for group in adam.param_groups:
             group["lr"] = first * (last / first) ** (number / (total - 1))
         adam.zero_grad()
-        signal = pair.signal(kind, row["eigenfunctions"], row["suggestion"])
+        signal = pair.signal(row["eigenfunctions"], row["suggestion"])
         terms = losses(pair, network(pair.source, signal, eigenfunctions), row["suggestion"])
         loss = sum(weight * term for weight, term in zip(LOSS_WEIGHTS, terms, strict=True))
         loss.backward()
