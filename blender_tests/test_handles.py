@@ -108,8 +108,10 @@ def test_held_empties_are_locked_and_moved_ones_are_not():
     feet, head = bpy.data.objects["feet"], bpy.data.objects["head"]
     assert all(feet.lock_location) and all(feet.lock_rotation) and all(feet.lock_scale)
     assert not any(head.lock_location)
+    assert (feet.empty_display_type, head.empty_display_type) == ("CUBE", "SPHERE")
     bar.supple.handles["feet"].kind = "MOVED"
     assert not any(feet.lock_location)
+    assert feet.empty_display_type == "SPHERE"
 
 
 def test_remove_takes_the_empty_and_nothing_else():

@@ -124,10 +124,9 @@ def _place(obj, handle, bind):
 def _add_row(context, obj, name, world, positions, kind):
     bind = space.bind_matrix(world, positions.mean(axis=0))
     empty = bpy.data.objects.new(name, None)
-    empty.empty_display_type = "CUBE" if kind == "HELD" else "SPHERE"
     points = space.to_world_points(world, positions)
     reach = np.linalg.norm(points - points.mean(axis=0), axis=1).max()
-    empty.empty_display_size = max(float(reach), 1e-3)
+    empty.empty_display_size = max(0.7 * float(reach), 1e-3)
     empty.show_in_front = True
     _collection(context, obj).objects.link(empty)
     row = obj.supple.handles.add()

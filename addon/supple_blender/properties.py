@@ -22,10 +22,11 @@ MODES = (
 )
 
 
-def _lock_when_held(handle, _context):
-    """A held handle's Empty does not move, so that nobody drags it in vain."""
+def _show_kind(handle, _context):
+    """Make the Empty of a held handle a cube that is locked, so that nobody drags it in vain."""
     if handle.empty:
         empty = handle.empty
+        empty.empty_display_type = "CUBE" if handle.kind == "HELD" else "SPHERE"
         for lock in (empty.lock_location, empty.lock_rotation, empty.lock_scale):
             lock[:] = [handle.kind == "HELD"] * 3
 
@@ -33,7 +34,7 @@ def _lock_when_held(handle, _context):
 class SUPPLE_PG_handle(bpy.types.PropertyGroup):
     """One handle; its name is its vertex group's."""
 
-    kind: EnumProperty(name="Kind", items=KINDS, default="MOVED", update=_lock_when_held)
+    kind: EnumProperty(name="Kind", items=KINDS, default="MOVED", update=_show_kind)
     empty: PointerProperty(name="Empty", type=bpy.types.Object)
     bind: FloatVectorProperty(
         name="Bind",
