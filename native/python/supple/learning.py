@@ -28,7 +28,7 @@ class TrainResult:
 
 
 def train(
-    pairs: Sequence[tuple[ArrayLike, ArrayLike, ArrayLike]],
+    pairs: Sequence[tuple[ArrayLike, ...]],
     *,
     signal: str,
     config: str = "equivariant",
@@ -48,9 +48,12 @@ def train(
     """Train a Local Jacobian Network on pairs in 1:1 correspondence.
 
     Args:
-        pairs: (source_vertices (n, 3), faces (m, 3), target_vertices (n, 3)) each, any units.
-        signal: "rotation" (closest rotations of the true Jacobians) or "spectral" (the target in 20
-            to 100 eigenfunctions, drawn anew each step).
+        pairs: (source_vertices (n, 3), faces (m, 3), target_vertices (n, 3)) each, any units; for
+            the rotation signal optionally a fourth: a sequence of suggestions (vertices (n, 3),
+            held (k,)), what edits start from and the vertices that are at their targets there. One
+            is drawn each step; the signal is taken from it and the losses hold those vertices.
+        signal: "rotation" (closest rotations of a suggestion's Jacobians, without suggestions of the
+            true ones) or "spectral" (the target in 20 to 100 eigenfunctions, drawn anew each step).
         config: "equivariant" or "paper".
         epochs: every pair once each, in a new random order.
         seed: of the initial weights and every draw. Same seed and threads: same bytes.
@@ -87,8 +90,15 @@ def train(
                 arrays.points(source, f"pair {i}: source"),
                 arrays.triangles(faces, f"pair {i}: faces"),
                 arrays.points(target, f"pair {i}: target"),
+                [
+                    _native.Suggestion(
+                        arrays.points(vertices, f"pair {i}: suggestion {j}"),
+                        arrays.indices(held, f"pair {i}: held vertices of suggestion {j}"),
+                    )
+                    for j, (vertices, held) in enumerate(suggestions[0] if suggestions else ())
+                ],
             )
-            for i, (source, faces, target) in enumerate(pairs)
+            for i, (source, faces, target, *suggestions) in enumerate(pairs)
         ],
         options,
         0 if max_steps is None else max_steps,

@@ -23,17 +23,6 @@ Eigen::RowVector3d corner_cross(const Points& v, const Faces& f, Eigen::Index i)
   return a.cross(b);
 }
 
-bool is_degenerate(const Points& v, const Faces& f, Eigen::Index i) {
-  if (f(i, 0) == f(i, 1) || f(i, 1) == f(i, 2) || f(i, 2) == f(i, 0)) {
-    return true;
-  }
-  double longest = 0.0;
-  for (int e = 0; e < 3; ++e) {
-    longest = std::max(longest, (v.row(f(i, e)) - v.row(f(i, (e + 1) % 3))).squaredNorm());
-  }
-  return !(corner_cross(v, f, i).norm() > kThinnest * longest);
-}
-
 int find_root(std::vector<int>& parent, int i) {
   while (parent[i] != i) {
     parent[i] = parent[parent[i]];
@@ -225,6 +214,17 @@ Points TriangleMesh::scatter(const Points& moved, const MatrixField& vertex_jaco
         (moved.row(anchor) + rest * matrix_at(vertex_jacobians, anchor)) * scale_ + centre_;
   }
   return result;
+}
+
+bool is_degenerate(const Points& v, const Faces& f, Eigen::Index i) {
+  if (f(i, 0) == f(i, 1) || f(i, 1) == f(i, 2) || f(i, 2) == f(i, 0)) {
+    return true;
+  }
+  double longest = 0.0;
+  for (int e = 0; e < 3; ++e) {
+    longest = std::max(longest, (v.row(f(i, e)) - v.row(f(i, (e + 1) % 3))).squaredNorm());
+  }
+  return !(corner_cross(v, f, i).norm() > kThinnest * longest);
 }
 
 Eigen::VectorXd face_areas(const Points& vertices, const Faces& faces) {

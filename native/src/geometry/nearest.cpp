@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "supple/geometry/nearest.h"
 
+#include <algorithm>
+#include <array>
 #include <nanoflann.hpp>
 
 namespace supple {
@@ -29,11 +31,22 @@ NearestPoints::Result NearestPoints::query(const Points& queries) const {
   Result result{Eigen::VectorXi(queries.rows()), Eigen::VectorXd(queries.rows())};
 #pragma omp parallel for schedule(static)
   for (Eigen::Index i = 0; i < queries.rows(); ++i) {
-    size_t index = 0;
-    nanoflann::KNNResultSet<double> nearest(1);
-    nearest.init(&index, &result.squared_distance[i]);
+    // Equally near to rounding: the lowest index, so that a turned mesh gives the same answer. More
+    // than a handful of ties does not happen on real meshes.
+    constexpr size_t kCandidates = 8;
+    std::array<size_t, kCandidates> index{};
+    std::array<double, kCandidates> squared{};
+    nanoflann::KNNResultSet<double> nearest(kCandidates);
+    nearest.init(index.data(), squared.data());
     impl_->tree.findNeighbors(nearest, queries.row(i).data(), {});
-    result.index[i] = static_cast<int>(index);
+    size_t best = index[0];
+    for (size_t c = 1; c < nearest.size(); ++c) {
+      if (squared[c] <= squared[0] * (1.0 + 1e-9) + 1e-18) {
+        best = std::min(best, index[c]);
+      }
+    }
+    result.squared_distance[i] = squared[0];
+    result.index[i] = static_cast<int>(best);
   }
   return result;
 }

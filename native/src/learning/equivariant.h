@@ -28,14 +28,17 @@ using Mat3 = Eigen::Matrix<Scalar, 3, 3, Eigen::RowMajor>;
 template <class Scalar>
 using Row3 = Eigen::Matrix<Scalar, 1, 3>;
 
-/// The matrices B_b - L of one face.
-/// fields: the signal there; smooth: fields * kScaleCount matrices; normal: the rest normal.
+/// The matrices B_b - L of one face, for matrices given without a reference C that they share:
+/// fields X_i - C and smooth Y_is - C (fields * kScaleCount of them). Where all are equal, every
+/// one is 0, not 0 to the rounding of C. reference_defect: C C^T - I; normal: the rest normal.
 template <class Scalar>
 std::array<Mat3<Scalar>, basis_count(kMaxFields)> face_bases(
     const std::vector<Mat3<Scalar>>& fields, const std::vector<Mat3<Scalar>>& smooth,
-    const Row3<Scalar>& normal) {
+    const Row3<Scalar>& normal, const Mat3<Scalar>& reference,
+    const Mat3<Scalar>& reference_defect) {
   std::array<Mat3<Scalar>, basis_count(kMaxFields)> bases;
   const Mat3<Scalar>& lead = fields.back();
+  const Mat3<Scalar> whole_lead = reference + lead;
   const Mat3<Scalar> along_normal = normal.transpose() * normal;
   size_t next = 0;
   const auto add = [&](const Mat3<Scalar>& matrix) {
@@ -50,7 +53,11 @@ std::array<Mat3<Scalar>, basis_count(kMaxFields)> face_bases(
     add(matrix);
   }
   for (size_t s = smooth.size() - kScaleCount; s < smooth.size(); ++s) {
-    bases[next++] = smooth[s] * (smooth[s].transpose() * lead) - lead;
+    // Y Y^T - I with Y = C + e.
+    const Mat3<Scalar> mixed = reference * smooth[s].transpose();
+    const Mat3<Scalar> defect =
+        reference_defect + mixed + mixed.transpose() + smooth[s] * smooth[s].transpose();
+    bases[next++] = defect * whole_lead;
   }
   return bases;
 }

@@ -21,13 +21,22 @@ Mat3<Scalar> matrix_in(const RowMatrix<Scalar>& rows, Eigen::Index r, Eigen::Ind
   return Eigen::Map<const Mat3<Scalar>>(rows.row(r).data() + 9 * matrix);
 }
 
-// n x 9F: the signal's fields averaged to vertices, side by side.
+// What all matrices of a signal share, taken out before anything is rounded to Scalar: the mean of
+// its last field by area. It turns with the meshes as the fields do.
+Matrix3 reference_of(const SurfaceOperators& operators, const Signal& signal) {
+  const Eigen::Matrix<double, 1, 9> sum = operators.face_areas.transpose() * signal.fields.back();
+  return Eigen::Map<const Matrix3>(sum.data()) / operators.face_areas.sum();
+}
+
+// n x 9F: the signal's fields less a reference, averaged to vertices, side by side.
 template <class Scalar>
-RowMatrix<Scalar> vertex_fields(const SurfaceOperators& operators, const Signal& signal) {
+RowMatrix<Scalar> vertex_fields(const SurfaceOperators& operators, const Signal& signal,
+                                const Matrix3& reference) {
   const auto fields = static_cast<Eigen::Index>(signal.fields.size());
   RowMatrix<Scalar> result(operators.vertices.rows(), 9 * fields);
   for (Eigen::Index i = 0; i < fields; ++i) {
-    const MatrixField average = operators.average * signal.fields[static_cast<size_t>(i)];
+    MatrixField average = operators.average * signal.fields[static_cast<size_t>(i)];
+    average.rowwise() -= Eigen::Map<const Eigen::Matrix<double, 1, 9>>(reference.data());
     result.middleCols(9 * i, 9) = average.cast<Scalar>();
   }
   return result;
@@ -59,7 +68,7 @@ RowMatrix<Scalar> smoothed_fields(const NetworkContext<Scalar>& context,
 
 template <class Scalar>
 RowMatrix<Scalar> invariants(const NetworkContext<Scalar>& context, const RowMatrix<Scalar>& fields,
-                             const RowMatrix<Scalar>& smooth) {
+                             const RowMatrix<Scalar>& smooth, const Mat3<Scalar>& reference) {
   const Eigen::Index field_count = fields.cols() / 9;
   const Eigen::Index smooth_count = smooth.cols() / 9;
   RowMatrix<Scalar> result(context.samples.size(),
@@ -71,10 +80,10 @@ RowMatrix<Scalar> invariants(const NetworkContext<Scalar>& context, const RowMat
     for (Eigen::Index p = 0; p < context.samples.size(); ++p) {
       const int v = context.samples[p];
       for (Eigen::Index i = 0; i < field_count; ++i) {
-        matrices[static_cast<size_t>(i)] = matrix_in(fields, v, i);
+        matrices[static_cast<size_t>(i)] = reference + matrix_in(fields, v, i);
       }
       for (Eigen::Index i = 0; i < smooth_count; ++i) {
-        matrices[static_cast<size_t>(field_count + i)] = matrix_in(smooth, v, i);
+        matrices[static_cast<size_t>(field_count + i)] = reference + matrix_in(smooth, v, i);
       }
       const Row3<Scalar> normal = context.operators->vertex_normals.row(v).template cast<Scalar>();
       equivariant::point_invariants(matrices, normal, result.row(p).data());
@@ -89,6 +98,10 @@ template <class Scalar, class Visit>
 void for_each_face_bases(const NetworkContext<Scalar>& context, const Signal& signal,
                          const RowMatrix<Scalar>& smooth, const Visit& visit) {
   const SurfaceOperators& operators = *context.operators;
+  const Matrix3 exact_reference = reference_of(operators, signal);
+  const Mat3<Scalar> reference = exact_reference.template cast<Scalar>();
+  const Mat3<Scalar> defect =
+      (exact_reference * exact_reference.transpose() - Matrix3::Identity()).template cast<Scalar>();
   const auto smooth_count = static_cast<size_t>(smooth.cols() / 9);
 #pragma omp parallel
   {
@@ -96,7 +109,7 @@ void for_each_face_bases(const NetworkContext<Scalar>& context, const Signal& si
 #pragma omp for schedule(static)
     for (Eigen::Index f = 0; f < operators.faces.rows(); ++f) {
       for (size_t i = 0; i < here.size(); ++i) {
-        here[i] = matrix_at(signal.fields[i], f).template cast<Scalar>();
+        here[i] = (matrix_at(signal.fields[i], f) - exact_reference).template cast<Scalar>();
       }
       for (size_t i = 0; i < smooth_count; ++i) {
         smooth_here[i].setZero();
@@ -106,7 +119,7 @@ void for_each_face_bases(const NetworkContext<Scalar>& context, const Signal& si
         smooth_here[i] *= Scalar(1.0 / 3.0);
       }
       const Row3<Scalar> normal = operators.face_normals.row(f).template cast<Scalar>();
-      visit(f, equivariant::face_bases(here, smooth_here, normal));
+      visit(f, equivariant::face_bases(here, smooth_here, normal, reference, defect));
     }
   }
 }
@@ -233,11 +246,14 @@ template <class Scalar>
 RowMatrix<Scalar> LocalJacobianNetwork<Scalar>::inputs(const NetworkContext<Scalar>& context,
                                                        const Signal& signal,
                                                        RowMatrix<Scalar>* smooth) const {
-  const RowMatrix<Scalar> fields = vertex_fields<Scalar>(*context.operators, signal);
   if (architecture_.configuration == Configuration::equivariant) {
+    const Matrix3 reference = reference_of(*context.operators, signal);
+    const RowMatrix<Scalar> fields = vertex_fields<Scalar>(*context.operators, signal, reference);
     *smooth = smoothed_fields(context, fields);
-    return invariants(context, fields, *smooth);
+    return invariants<Scalar>(context, fields, *smooth, reference.template cast<Scalar>());
   }
+  const RowMatrix<Scalar> fields =
+      vertex_fields<Scalar>(*context.operators, signal, Matrix3::Zero());
   RowMatrix<Scalar> result(context.samples.size(), 9);
   for (Eigen::Index p = 0; p < result.rows(); ++p) {
     result.row(p) = fields.row(context.samples[p]).head(9);

@@ -107,6 +107,17 @@ Eigen::MatrixXd lanczos(const SparseCholesky& factor, const Eigen::VectorXd& roo
   return solver.eigenvectors(count);
 }
 
+// How many pairs are still to be found: up to `count`, and below the last of those found.
+Eigen::Index count_missing(const SparseMatrix& laplacian, const Eigen::VectorXd& mass,
+                           const Pairs& pairs, Eigen::Index count) {
+  if (pairs.values.size() < count) {
+    return count - pairs.values.size();
+  }
+  const double top = pairs.values[count - 1] * (1.0 - kMultiple);
+  const Eigen::Index found = (pairs.values.array() < top).count();
+  return std::max<Eigen::Index>(count_below(laplacian, mass, top) - found, 0);
+}
+
 double worst_residual(const SparseMatrix& symmetric, const Pairs& pairs) {
   const Eigen::MatrixXd r = symmetric * pairs.vectors - pairs.vectors * pairs.values.asDiagonal();
   double worst = 0.0;
@@ -151,22 +162,31 @@ Eigen::Index Eigenbasis::stable_count(Eigen::Index limit) const {
   if (limit >= size()) {
     return size();
   }
+  const auto gap_above = [&](Eigen::Index k) {
+    return values[k] - values[k - 1] > kMultiple * std::max(values[k], 1.0);
+  };
   for (Eigen::Index k = limit; k >= 1; --k) {
-    if (values[k] - values[k - 1] > kMultiple * values[k]) {
+    if (gap_above(k)) {
       return k;
     }
   }
-  return limit;
+  for (Eigen::Index k = limit + 1; k < size(); ++k) {
+    if (gap_above(k)) {
+      return k;
+    }
+  }
+  return size();
 }
 
 Eigen::Index stable_count(const Eigenbasis& a, const Eigenbasis& b, Eigen::Index limit) {
-  while (true) {
+  for (int step = 0; step < 16; ++step) {  // the two can push each other up and down near the ends
     const Eigen::Index count = b.stable_count(a.stable_count(limit));
     if (count == limit || count == a.stable_count(count)) {
       return count;
     }
     limit = count;
   }
+  return std::min({limit, a.size(), b.size()});
 }
 
 Eigenbasis eigenbasis(const SparseMatrix& laplacian, const Eigen::VectorXd& mass,
@@ -190,22 +210,28 @@ Eigenbasis eigenbasis(const SparseMatrix& laplacian, const Eigen::VectorXd& mass
     const SparseCholesky factor(shifted(laplacian, mass, shift));
     pairs = rayleigh_ritz(
         symmetric, lanczos(factor, root_mass, Eigen::MatrixXd(n, 0), count, options, progress));
-    // Lanczos can miss copies of a multiple eigenvalue: count, and look for them in the complement.
+    // Lanczos can leave pairs out: those that did not converge, and copies of a multiple
+    // eigenvalue. Look for them in the complement.
     for (int attempt = 0; attempt < 3; ++attempt) {
-      const double top = pairs.values[count - 1] * (1.0 - kMultiple);
-      const Eigen::Index below = (pairs.values.array() < top).count();
-      const Eigen::Index truth = count_below(laplacian, mass, top);
-      if (truth < 0 || truth <= below) {
+      const Eigen::Index missing = count_missing(laplacian, mass, pairs, count);
+      if (missing == 0) {
         break;
       }
-      const Eigen::Index missing = std::min<Eigen::Index>(truth - below + 2, n - count - 1);
-      Eigen::MatrixXd joined(n, count + missing);
-      joined << pairs.vectors,
-          lanczos(factor, root_mass, pairs.vectors, missing, options, progress);
+      const Eigen::Index wanted = std::min<Eigen::Index>(missing + 2, n - pairs.vectors.cols() - 1);
+      const Eigen::MatrixXd more =
+          lanczos(factor, root_mass, pairs.vectors, wanted, options, progress);
+      Eigen::MatrixXd joined(n, pairs.vectors.cols() + more.cols());
+      joined << pairs.vectors, more;
       pairs = rayleigh_ritz(symmetric, joined);
-      pairs.values.conservativeResize(count);
-      pairs.vectors.conservativeResize(n, count);
     }
+    if (pairs.values.size() < count) {
+      throw Error(ErrorCode::no_convergence,
+                  "Only " + std::to_string(pairs.values.size()) + " of " + std::to_string(count) +
+                      " eigenfunctions were found. Remove slivers from the mesh or ask for fewer "
+                      "functions.");
+    }
+    pairs.values.conservativeResize(count);
+    pairs.vectors.conservativeResize(n, count);
   }
 
   Eigenbasis basis;

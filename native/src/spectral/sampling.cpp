@@ -30,7 +30,7 @@ Eigen::VectorXi farthest_point_samples(const Points& points, Eigen::Index count)
   distance.setConstant(std::numeric_limits<double>::max());
   while (static_cast<Eigen::Index>(samples.size()) < count) {
     const Eigen::RowVector3d last = points.row(samples.back());
-#pragma omp parallel for schedule(static)
+    // Serial: a parallel loop's barriers, one a sample, cost more than they save.
     for (Eigen::Index i = 0; i < n; ++i) {
       distance[i] = std::min(distance[i], (points.row(i) - last).squaredNorm());
     }

@@ -15,6 +15,10 @@ Points deform(const PreparedMesh& prepared, const Points& target, int count,
                 "The target has " + std::to_string(target.rows()) + " vertices, the source " +
                     std::to_string(mesh.vertices().rows()) + "; they must be the same vertices.");
   }
+  if (count < 1) {
+    throw Error(ErrorCode::bad_option,
+                "The target needs at least 1 eigenfunction, not " + std::to_string(count) + ".");
+  }
   if (network != nullptr && network->architecture().signal != SignalKind::spectral) {
     throw Error(ErrorCode::bad_option,
                 "This network takes rotations. Deforming a pair needs one trained on the spectral "

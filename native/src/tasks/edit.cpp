@@ -102,7 +102,7 @@ Editor::Editor(std::shared_ptr<const PreparedMesh> prepared, std::vector<Handle>
         Eigen::VectorXd::Constant(operators.component_count, std::numeric_limits<double>::max());
     for (Eigen::Index i = 0; i < loose_points.rows(); ++i) {
       const int piece = operators.component[held[static_cast<size_t>(handle_rows_ + i)]];
-      if (nearest.squared_distance[i] < best[piece]) {
+      if (nearest.squared_distance[i] < best[piece] * (1.0 - 1e-9)) {  // ties: the first
         best[piece] = nearest.squared_distance[i];
         anchor_[piece] = firm[static_cast<size_t>(nearest.index[i])];
       }

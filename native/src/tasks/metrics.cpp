@@ -72,11 +72,10 @@ Points neighbour_normals(const Points& normals, const Faces& faces) {
 
 Eigen::VectorXd face_distortion(const Points& rest, const Faces& faces, const Points& posed) {
   check_same(rest, posed);
-  const Eigen::VectorXd areas = face_areas(rest, faces);
   Eigen::VectorXd result = Eigen::VectorXd::Zero(faces.rows());
 #pragma omp parallel for schedule(static)
   for (Eigen::Index f = 0; f < faces.rows(); ++f) {
-    if (areas[f] > 0.0) {
+    if (!is_degenerate(rest, faces, f)) {
       result[f] = distortion(flattened(rest, faces, f), flattened(posed, faces, f));
     }
   }
@@ -98,11 +97,13 @@ int flipped_faces(const Points& rest, const Faces& faces, const Points& posed) {
   const Eigen::VectorXd posed_areas = face_areas(posed, faces);
   int count = 0;
   for (Eigen::Index f = 0; f < faces.rows(); ++f) {
-    if (rest_areas[f] <= 0.0) {
+    if (is_degenerate(rest, faces, f)) {
       continue;
     }
-    const bool was_over = rest_normals.row(f).dot(rest_around.row(f)) < 0.0;
-    const bool is_over = posed_normals.row(f).dot(posed_around.row(f)) < 0.0;
+    // At exactly 90 degrees (three sheets on an edge) rounding must not decide.
+    constexpr double kEdge = 1e-9;
+    const bool was_over = rest_normals.row(f).dot(rest_around.row(f)) < kEdge;
+    const bool is_over = posed_normals.row(f).dot(posed_around.row(f)) < -kEdge;
     const bool collapsed = posed_areas[f] < 1e-6 * rest_areas[f];
     count += ((is_over && !was_over) || collapsed) ? 1 : 0;
   }

@@ -76,6 +76,10 @@ class TriangleMesh {
   int component_count_ = 0;
 };
 
+/// Whether face i has no area that a double-precision solve could use: a repeated corner, or a
+/// height below 1e-8 of its longest edge.
+bool is_degenerate(const Points& vertices, const Faces& faces, Eigen::Index i);
+
 /// m: area of each face, in squared units of the vertices.
 Eigen::VectorXd face_areas(const Points& vertices, const Faces& faces);
 

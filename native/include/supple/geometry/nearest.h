@@ -15,7 +15,7 @@ class NearestPoints {
   ~NearestPoints();
 
   struct Result {
-    Eigen::VectorXi index;             ///< q: row of the nearest point
+    Eigen::VectorXi index;  ///< q: row of the nearest point, the lowest of those equal to 1e-9
     Eigen::VectorXd squared_distance;  ///< q
   };
   /// queries: q x 3.

@@ -99,7 +99,7 @@ class LocalJacobianNetwork {
 
   struct Trace {
     SpectralMlpTrace<Scalar> mlp;
-    RowMatrix<Scalar> smooth;  // n x 9 (fields * scales)
+    RowMatrix<Scalar> smooth;  // n x 9 (fields * scales), less the reference
   };
   /// m x 9 Jacobians of a signal.
   MatrixField forward(const NetworkContext<Scalar>& context, const Signal& signal,

@@ -21,8 +21,10 @@ struct Eigenbasis {
   RowMatrix<double> expand(const RowMatrix<double>& coefficients) const;
   /// Spectral projection Phi Phi^T M f with the first `count` functions. Source: the paper, Eqn 7.
   RowMatrix<double> project(const RowMatrix<double>& field, Eigen::Index count) const;
-  /// The largest count <= `limit` that does not cut through a (nearly) multiple eigenvalue. Beyond
-  /// it the span would depend on rounding, and a turned mesh would not give the turned result.
+  /// The largest count <= `limit` that does not cut through a (nearly) multiple eigenvalue; the
+  /// smallest above where there is none (a mesh of more pieces than `limit` has that many zeros).
+  /// Elsewhere the span would depend on rounding, and a turned mesh would not give the turned
+  /// result.
   Eigen::Index stable_count(Eigen::Index limit) const;
 };
 
@@ -34,7 +36,7 @@ struct EigenbasisOptions {
   /// The stated residual; where rounding alone leaves more (16 eps |M^-1/2 W M^-1/2|_1, slivers),
   /// that.
   double residual = 1e-8;
-  int max_iterations = 1000;  ///< Lanczos restarts
+  int max_iterations = 200;  ///< Lanczos restarts
 };
 
 /// laplacian: n x n cotangent Laplacian; mass: n, positive. Shift-invert Lanczos (Spectra) on the

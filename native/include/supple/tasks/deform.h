@@ -11,8 +11,8 @@ namespace supple {
 ///
 /// target: n x 3, the same vertices as the prepared mesh. network: nullptr for the answer without
 /// one (the coarse Jacobians through the same Poisson solve). Each component keeps its target's
-/// centroid. Errors: `wrong_shape`; `bad_option` if the network takes another signal; those of
-/// `TriangleMesh` for the target.
+/// centroid. Errors: `wrong_shape`; `bad_option` if count < 1 or the network takes another signal;
+/// those of `TriangleMesh` for the target.
 Points deform(const PreparedMesh& prepared, const Points& target, int count,
               const LocalJacobianNetwork<float>* network, ProgressRange progress = {});
 
