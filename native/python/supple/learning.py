@@ -38,7 +38,7 @@ def train(
     width: int = 256,
     eigenfunctions: int = 128,
     learning_rate: tuple[float, float] = (1e-3, 1e-5),
-    loss_weights: tuple[float, float, float] | None = None,
+    loss_weights: tuple[float, float, float] = (1.0, 10.0, 2.0),
     metadata: dict[str, str] | None = None,
     max_steps: int | None = None,
     double: bool = False,
@@ -61,9 +61,7 @@ def train(
             ("equivariant") or 0 ("paper").
         width, eigenfunctions: of the network.
         learning_rate: first and last; between them the same factor every step.
-        loss_weights: of the Jacobian, position and integrated terms; None for the paper's 1, 10, 2
-            ("paper") or 1, 1000, 2 ("equivariant": with lengths in units of the root of the area,
-            positions that are 1% off give 1e-4, beside Jacobian terms of 0.2).
+        loss_weights: of the Jacobian, position and integrated terms; the paper's by default.
         metadata: added to the model's.
         max_steps: stop early (the schedule stays that of all epochs).
         double: train in double precision (for checks).
@@ -80,8 +78,6 @@ def train(
     options.seed = seed
     options.samples = (0 if config == "paper" else 1024) if samples is None else samples
     options.first_learning_rate, options.last_learning_rate = learning_rate
-    if loss_weights is None:
-        loss_weights = (1.0, 10.0 if config == "paper" else 1000.0, 2.0)
     options.loss_weights = list(loss_weights)
     run = _native.train_double if double else _native.train
     result = run(
