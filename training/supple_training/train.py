@@ -39,8 +39,8 @@ SUGGESTIONS = 4
 """Edits of each pair that the rotation network is trained on."""
 
 LOSS_WEIGHTS = {"rotation": (1.0, 10.0, 2.0), "spectral": (1.0, 1000.0, 2.0)}
-"""Of the Jacobian, position and integrated terms. Editing has the paper's. Positions of the spectral
-signal start 1% of the root of the area off: at the paper's 10 they would not weigh in at all."""
+"""Of the Jacobian, position and integrated terms. Editing has the paper's. Spectral positions
+start 1% of the root of the area off: at the paper's 10 they would not weigh in at all."""
 
 
 class Signal(StrEnum):

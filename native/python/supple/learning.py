@@ -51,8 +51,8 @@ def train(
         pairs: (source_vertices (n, 3), faces (m, 3), target_vertices (n, 3)) each, any units; for
             the rotation signal optionally a fourth: a sequence of suggestions (vertices (n, 3),
             held (k,)), what edits start from and the vertices that are at their targets there. One
-            is drawn each step; the signal is taken from it and the losses hold those vertices.
-        signal: "rotation" (closest rotations of a suggestion's Jacobians, without suggestions of the
+            is drawn each step: the signal is taken from it, the losses hold those vertices.
+        signal: "rotation" (closest rotations of a suggestion's Jacobians, or without one of the
             true ones) or "spectral" (the target in 20 to 100 eigenfunctions, drawn anew each step).
         config: "equivariant" or "paper".
         epochs: every pair once each, in a new random order.
