@@ -18,6 +18,10 @@ Eigen::VectorXi slots(Eigen::Index n, const Eigen::VectorXi& held) {
                                                      " is not in a system of " + std::to_string(n) +
                                                      " rows.");
     }
+    if (slot[held[i]] < 0) {
+      throw Error(ErrorCode::overlapping_handles,
+                  "Held row " + std::to_string(held[i]) + " is listed twice.");
+    }
     slot[held[i]] = -1 - static_cast<int>(i);
   }
   int next = 0;

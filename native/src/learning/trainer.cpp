@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "supple/learning/trainer.h"
 
+#include <algorithm>
 #include <numeric>
 #include <string>
 
@@ -82,27 +83,36 @@ struct Trainer<Scalar>::Example {
   }
 
   void add(const Suggestion& suggestion, int index) {
-    if (suggestion.vertices.rows() != mesh.vertices().rows()) {
-      throw Error(ErrorCode::wrong_shape,
-                  "A suggestion of pair " + std::to_string(index) + " has " +
-                      std::to_string(suggestion.vertices.rows()) + " vertices, the source " +
-                      std::to_string(mesh.vertices().rows()) + "; they must be the same vertices.");
+    const auto fail = [&](ErrorCode code, const std::string& what) {
+      throw Error(code, "A suggestion of pair " + std::to_string(index) + " " + what);
+    };
+    const Eigen::Index n = mesh.vertices().rows();
+    if (suggestion.vertices.rows() != n) {
+      fail(ErrorCode::wrong_shape, "has " + std::to_string(suggestion.vertices.rows()) +
+                                       " vertices, the source " + std::to_string(n) +
+                                       "; they must be the same vertices.");
+    }
+    if (!suggestion.vertices.allFinite()) {
+      fail(ErrorCode::not_finite, "has a coordinate that is not a finite number.");
     }
     Points moved(operators.vertices.rows(), 3);
     for (Eigen::Index i = 0; i < moved.rows(); ++i) {
       moved.row(i) = suggestion.vertices.row(mesh.mesh_vertex()[i]);
     }
     std::vector<int> held;
+    std::vector<bool> held_component(static_cast<size_t>(operators.component_count), false);
     for (const int vertex : suggestion.held) {
-      if (vertex < 0 || vertex >= mesh.vertices().rows()) {
-        throw Error(ErrorCode::index_out_of_range,
-                    "A suggestion of pair " + std::to_string(index) + " holds vertex " +
-                        std::to_string(vertex) + "; the source has " +
-                        std::to_string(mesh.vertices().rows()) + ".");
+      if (vertex < 0 || vertex >= n) {
+        fail(ErrorCode::index_out_of_range, "holds vertex " + std::to_string(vertex) +
+                                                "; the source has " + std::to_string(n) + ".");
       }
-      if (mesh.surface_vertex()[vertex] >= 0) {
-        held.push_back(mesh.surface_vertex()[vertex]);
+      if (const int surface = mesh.surface_vertex()[vertex]; surface >= 0) {
+        held.push_back(surface);
+        held_component[static_cast<size_t>(operators.component[surface])] = true;
       }
+    }
+    if (std::find(held_component.begin(), held_component.end(), false) != held_component.end()) {
+      fail(ErrorCode::no_handles, "holds no vertex of one of its pieces. Hold one of each.");
     }
     const auto count = static_cast<Eigen::Index>(held.size());
     suggestions.push_back(

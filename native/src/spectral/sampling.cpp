@@ -8,13 +8,18 @@
 #include <vector>
 
 namespace supple {
+namespace {
+
+// Distances this close, relatively, are equal but for rounding.
+constexpr double kTie = 1e-9;
+
+}  // namespace
 
 Eigen::VectorXi farthest_point_samples(const Points& points, Eigen::Index count) {
   const Eigen::Index n = points.rows();
   if (n <= count) {
     return Eigen::VectorXi::LinSpaced(n, 0, static_cast<int>(n) - 1);
   }
-  constexpr double kTie = 1e-9;
   const auto farthest = [&](const Eigen::VectorXd& distance) {
     int best = 0;
     for (int i = 1; i < n; ++i) {
@@ -67,7 +72,14 @@ SpectralDomain<Scalar> sampled_domain(const Eigenbasis& basis, Eigen::Index coun
 #pragma omp parallel for schedule(static)
   for (Eigen::Index i = 0; i < points.rows(); ++i) {
     const Eigen::RowVector3d point = points.row(i);
-    (centres.rowwise() - point).rowwise().squaredNorm().minCoeff(&owner[i]);
+    double nearest = std::numeric_limits<double>::max();
+    for (int s = 0; s < centres.rows(); ++s) {
+      const double distance = (centres.row(s) - point).squaredNorm();
+      if (distance < nearest * (1.0 - kTie)) {
+        nearest = distance;
+        owner[i] = s;
+      }
+    }
   }
   Eigen::VectorXd weight = Eigen::VectorXd::Zero(samples.size());
   for (Eigen::Index i = 0; i < points.rows(); ++i) {

@@ -14,7 +14,8 @@ namespace supple {
 class HeldSystem {
  public:
   /// matrix: n x n, definite once the held rows are taken out. held: distinct indices in [0, n).
-  /// Errors: `index_out_of_range`, `not_positive_definite`.
+  /// Errors: `index_out_of_range`, `overlapping_handles` (a row held twice),
+  /// `not_positive_definite`.
   HeldSystem(const SparseMatrix& matrix, const Eigen::VectorXi& held,
              SparseCholesky::Backend backend = SparseCholesky::default_backend());
 
