@@ -46,15 +46,18 @@ MatrixField inverse_frames(const MatrixField& frames) {
   return inverses;
 }
 
-MatrixField jacobians(const MatrixField& inverse_rest_frames, const Points& moved,
-                      const Faces& faces) {
-  MatrixField field = face_frames(moved, faces);
+MatrixField jacobians(const MatrixField& inverse_rest_frames, const MatrixField& moved_frames) {
+  MatrixField field(moved_frames.rows(), 9);
 #pragma omp parallel for schedule(static)
-  for (Eigen::Index f = 0; f < faces.rows(); ++f) {
-    const Matrix3 frame = matrix_at(field, f);
-    matrix_at(field, f).noalias() = matrix_at(inverse_rest_frames, f) * frame;
+  for (Eigen::Index f = 0; f < moved_frames.rows(); ++f) {
+    matrix_at(field, f).noalias() = matrix_at(inverse_rest_frames, f) * matrix_at(moved_frames, f);
   }
   return field;
+}
+
+MatrixField jacobians(const MatrixField& inverse_rest_frames, const Points& moved,
+                      const Faces& faces) {
+  return jacobians(inverse_rest_frames, face_frames(moved, faces));
 }
 
 Points jacobians_backward(const MatrixField& inverse_rest_frames, const Points& moved,

@@ -189,6 +189,10 @@ void TriangleMesh::note_edges() {
   }
 }
 
+bool TriangleMesh::same_surface_vertices(const TriangleMesh& other) const {
+  return mesh_vertex_.size() == other.mesh_vertex_.size() && mesh_vertex_ == other.mesh_vertex_;
+}
+
 double TriangleMesh::diagonal() const {
   return (vertices_.colwise().maxCoeff() - vertices_.colwise().minCoeff()).norm();
 }

@@ -14,6 +14,23 @@ namespace {
 // little.
 constexpr double kTrust = 0.03;
 
+// Weight of the whole mesh's rotation against a face's own: decides only where a face has none.
+constexpr double kWhole = 1e-6;
+
+// Frames of projected vertices. Where projection shrinks a face to a point, its normal is rounding:
+// 0.
+MatrixField coarse_frames(const Points& vertices, const Faces& faces,
+                          const Eigen::VectorXd& rest_areas) {
+  MatrixField frames = face_frames(vertices, faces);
+  const Eigen::VectorXd areas = face_areas(vertices, faces);
+  for (Eigen::Index f = 0; f < faces.rows(); ++f) {
+    if (areas[f] < 1e-9 * rest_areas[f]) {
+      matrix_at(frames, f).row(2).setZero();
+    }
+  }
+  return frames;
+}
+
 }  // namespace
 
 const char* to_string(SignalKind kind) {
@@ -36,24 +53,32 @@ Signal rotation_signal(const MatrixField& suggested) { return {{closest_rotation
 
 Signal spectral_signal(const SurfaceOperators& source, const Eigenbasis& basis,
                        const Points& coarse_target, Eigen::Index count) {
-  const Points coarse_source = basis.project(source.vertices, count);
-  const MatrixField from = face_frames(coarse_source, source.faces);
-  const MatrixField to = face_frames(coarse_target, source.faces);
-  MatrixField coarse(source.faces.rows(), 9);
+  const MatrixField from =
+      coarse_frames(basis.project(source.vertices, count), source.faces, source.face_areas);
+  const MatrixField to = coarse_frames(coarse_target, source.faces, source.face_areas);
+  const Eigen::Index m = source.faces.rows();
+  // Edges are short and the normal is not: weigh them alike.
+  MatrixField gram(m, 9), cross(m, 9);
 #pragma omp parallel for schedule(static)
-  for (Eigen::Index f = 0; f < source.faces.rows(); ++f) {
-    // Edges are short and the normal is not: weigh them alike.
-    const double edge_weight = 1.0 / (2.0 * source.face_areas[f]);
+  for (Eigen::Index f = 0; f < m; ++f) {
     Matrix3 weighted = matrix_at(from, f);
-    weighted.topRows<2>() *= edge_weight;
-    const Matrix3 gram = weighted.transpose() * matrix_at(from, f);
-    const Matrix3 cross = weighted.transpose() * matrix_at(to, f);
+    weighted.topRows<2>() /= 2.0 * source.face_areas[f];
+    matrix_at(gram, f) = weighted.transpose() * matrix_at(from, f);
+    matrix_at(cross, f) = weighted.transpose() * matrix_at(to, f);
+  }
+  // A piece so small that both projections are a point says nothing: it turns with the whole.
+  const Eigen::Matrix<double, 1, 9> sum = source.face_areas.transpose() * cross;
+  const Matrix3 overall = closest_rotation(Eigen::Map<const Matrix3>(sum.data()));
+  MatrixField coarse(m, 9);
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index f = 0; f < m; ++f) {
     // Where the projection has flattened a face it says nothing of stretch; there the rotation
     // stands.
-    const Matrix3 regular = gram + kTrust * Matrix3::Identity();
-    matrix_at(coarse, f) = regular.inverse() * (cross + kTrust * closest_rotation(cross));
+    const Matrix3 rotation = closest_rotation(matrix_at(cross, f) + kWhole * overall);
+    const Matrix3 regular = matrix_at(gram, f) + kTrust * Matrix3::Identity();
+    matrix_at(coarse, f) = regular.inverse() * (matrix_at(cross, f) + kTrust * rotation);
   }
-  return {{source.jacobians_of(coarse_target), std::move(coarse)}};
+  return {{jacobians(source.inverse_frames, to), std::move(coarse)}};
 }
 
 Points spectral_target(const Eigenbasis& source_basis, const Eigenbasis& target_basis,

@@ -54,7 +54,7 @@ struct Trainer<Scalar>::Example {
                       " target vertices; they must be the same vertices.");
     }
     const TriangleMesh moved = checked(pair.target, pair.faces, index, "target");
-    if (moved.mesh_vertex() != mesh.mesh_vertex()) {
+    if (!moved.same_surface_vertices(mesh)) {
       throw Error(ErrorCode::wrong_shape,
                   "Pair " + std::to_string(index) + " has vertices attached on one side only.");
     }

@@ -82,6 +82,9 @@ struct Pairs {
 
 // Rayleigh-Ritz in the span of `vectors` (made orthonormal), ascending.
 Pairs rayleigh_ritz(const SparseMatrix& symmetric, const Eigen::MatrixXd& vectors) {
+  if (vectors.cols() == 0) {
+    return {Eigen::VectorXd(0), vectors};
+  }
   const Eigen::MatrixXd q = Eigen::HouseholderQR<Eigen::MatrixXd>(vectors).householderQ() *
                             Eigen::MatrixXd::Identity(vectors.rows(), vectors.cols());
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> small(q.transpose() * (symmetric * q));
@@ -104,7 +107,8 @@ Eigen::MatrixXd lanczos(const SparseCholesky& factor, const Eigen::VectorXd& roo
   solver.compute(Spectra::SortRule::LargestAlge, options.max_iterations, 1e-13,
                  Spectra::SortRule::LargestAlge);
   // Not asking for Success: 1e-13 is a wish; what counts is the residual checked by the caller.
-  return solver.eigenvectors(count);
+  const Eigen::MatrixXd found_now = solver.eigenvectors(count);  // the converged ones only
+  return found_now.cols() > 0 ? found_now : Eigen::MatrixXd(n, 0);
 }
 
 // How many pairs are still to be found: up to `count`, and below the last of those found.
@@ -225,10 +229,11 @@ Eigenbasis eigenbasis(const SparseMatrix& laplacian, const Eigen::VectorXd& mass
       pairs = rayleigh_ritz(symmetric, joined);
     }
     if (pairs.values.size() < count) {
-      throw Error(ErrorCode::no_convergence,
-                  "Only " + std::to_string(pairs.values.size()) + " of " + std::to_string(count) +
-                      " eigenfunctions were found. Remove slivers from the mesh or ask for fewer "
-                      "functions.");
+      throw Error(ErrorCode::no_convergence, "Only " + std::to_string(pairs.values.size()) +
+                                                 " of " + std::to_string(count) +
+                                                 " eigenfunctions reached their residual. Remove "
+                                                 "slivers from the mesh or ask for fewer "
+                                                 "functions.");
     }
     pairs.values.conservativeResize(count);
     pairs.vectors.conservativeResize(n, count);

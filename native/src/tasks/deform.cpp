@@ -25,7 +25,7 @@ Points deform(const PreparedMesh& prepared, const Points& target, int count,
                 "signal.");
   }
   const TriangleMesh target_mesh(target, mesh.faces());
-  if (target_mesh.mesh_vertex() != mesh.mesh_vertex()) {
+  if (!target_mesh.same_surface_vertices(mesh)) {
     throw Error(
         ErrorCode::wrong_shape,
         "The target has other faces without area than the source, so they cannot be compared "

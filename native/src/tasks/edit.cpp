@@ -160,7 +160,7 @@ Points Editor::moved_as_one(const std::vector<HandleTarget>& targets, const Poin
     }
   }
   // Where a turn is still open, the smallest.
-  correlation += 1e-9 * correlation.norm() * Matrix3::Identity();
+  correlation += 1e-13 * correlation.norm() * Matrix3::Identity();
   if (correlation.norm() == 0.0) {
     correlation.setIdentity();
   }
@@ -168,28 +168,30 @@ Points Editor::moved_as_one(const std::vector<HandleTarget>& targets, const Poin
   return ((rest.rowwise() - from) * rotation).rowwise() + to;
 }
 
-Points Editor::suggestion(const std::vector<HandleTarget>& targets, const Points& held) const {
-  const Points rigid = moved_as_one(targets, held);
-  Points displacement = Points::Zero(held_.size(), 3);
-  for (Eigen::Index i = 0; i < handle_rows_; ++i) {
+Points Editor::suggestion(const Points& rigid, const Points& held) const {
+  Points displacement(held_.size(), 3);
+  for (Eigen::Index i = 0; i < held_.size(); ++i) {
     displacement.row(i) = held.row(i) - rigid.row(held_[i]);
   }
   return rigid + biharmonic_->solve(Points::Zero(rigid.rows(), 3), displacement);
 }
 
-void Editor::follow_loose_pieces(Points& moved, const MatrixField& vertex_jacobians) const {
-  const SurfaceOperators& operators = prepared_->operators;
-  std::vector<Matrix3> turn(static_cast<size_t>(anchor_.size()));
+void Editor::place_loose_pieces(Points& moved, const MatrixField& vertex_jacobians,
+                                LoosePieces choice) const {
+  const Points& rest = prepared_->operators.vertices;
+  std::vector<Matrix3> turn(static_cast<size_t>(anchor_.size()), Matrix3::Identity());
   for (Eigen::Index c = 0; c < anchor_.size(); ++c) {
-    if (anchor_[c] >= 0) {
+    if (anchor_[c] >= 0 && choice == LoosePieces::follow) {
       turn[static_cast<size_t>(c)] = closest_rotation(matrix_at(vertex_jacobians, anchor_[c]));
     }
   }
   for (Eigen::Index i = handle_rows_; i < held_.size(); ++i) {
-    const int vertex = held_[i], piece = operators.component[vertex], anchor = anchor_[piece];
-    moved.row(vertex) =
-        moved.row(anchor) + (operators.vertices.row(vertex) - operators.vertices.row(anchor)) *
-                                turn[static_cast<size_t>(piece)];
+    const int vertex = held_[i], piece = prepared_->operators.component[vertex];
+    const int anchor = anchor_[piece];
+    moved.row(vertex) = choice == LoosePieces::stay
+                            ? Eigen::RowVector3d(rest.row(vertex))
+                            : moved.row(anchor) + (rest.row(vertex) - rest.row(anchor)) *
+                                                      turn[static_cast<size_t>(piece)];
   }
 }
 
@@ -212,11 +214,13 @@ EditResult Editor::solve(const std::vector<HandleTarget>& targets, const EditOpt
       held.row(held_slot_[i]) = on_surface.row(i);
     }
   }
+  // Loose pieces go with the whole in the solves, so that one rigid motion of all stays one.
+  const Points rigid = moved_as_one(targets, held);
   for (Eigen::Index i = handle_rows_; i < held_.size(); ++i) {
-    held.row(i) = operators.vertices.row(held_[i]);
+    held.row(i) = rigid.row(held_[i]);
   }
 
-  Points moved = suggestion(targets, held);
+  Points moved = suggestion(rigid, held);
   result.report.suggestion_milliseconds = total.milliseconds();
 
   const bool with_network =
@@ -242,9 +246,7 @@ EditResult Editor::solve(const std::vector<HandleTarget>& targets, const EditOpt
   result.report.passes_milliseconds = passes_watch.milliseconds();
 
   const MatrixField vertex_jacobians = operators.average * operators.jacobians_of(moved);
-  if (options.loose_pieces == LoosePieces::follow) {
-    follow_loose_pieces(moved, vertex_jacobians);
-  }
+  place_loose_pieces(moved, vertex_jacobians, options.loose_pieces);
   result.vertices = mesh.scatter(moved, vertex_jacobians);
   Eigen::Index row = 0;
   for (const Handle& handle : handles_) {

@@ -19,6 +19,9 @@ MatrixField inverse_frames(const MatrixField& frames);
 MatrixField jacobians(const MatrixField& inverse_rest_frames, const Points& moved,
                       const Faces& faces);
 
+/// The same from the moved faces' frames, m x 9.
+MatrixField jacobians(const MatrixField& inverse_rest_frames, const MatrixField& moved_frames);
+
 /// n x 3: gradient with respect to the moved vertices, from the m x 9 gradient with respect to
 /// `jacobians(...)`; includes the turning of the unit normal.
 Points jacobians_backward(const MatrixField& inverse_rest_frames, const Points& moved,

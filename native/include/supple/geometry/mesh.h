@@ -46,6 +46,9 @@ class TriangleMesh {
   const Eigen::VectorXi& component() const { return component_; }
   int component_count() const { return component_count_; }
 
+  /// Whether the same mesh vertices are attached in both meshes.
+  bool same_surface_vertices(const TriangleMesh& other) const;
+
   /// Caller's units per unit of the surface: the square root of the area.
   double scale() const { return scale_; }
   /// Length of the bounding box's diagonal, in the caller's units.

@@ -84,9 +84,10 @@ class Editor {
   Points target_positions(const std::vector<HandleTarget>& targets) const;
   /// The one rigid motion nearest to what all handles ask, on surface vertices.
   Points moved_as_one(const std::vector<HandleTarget>& targets, const Points& held) const;
-  /// The smooth first guess: one rigid motion, then biharmonic interpolation of what is left.
-  Points suggestion(const std::vector<HandleTarget>& targets, const Points& held) const;
-  void follow_loose_pieces(Points& moved, const MatrixField& vertex_jacobians) const;
+  /// The smooth first guess: the rigid motion, then biharmonic interpolation of what is left.
+  Points suggestion(const Points& rigid, const Points& held) const;
+  void place_loose_pieces(Points& moved, const MatrixField& vertex_jacobians,
+                          LoosePieces choice) const;
 
   std::shared_ptr<const PreparedMesh> prepared_;
   std::vector<Handle> handles_;
