@@ -86,6 +86,7 @@ def obj_text(points: bodies.FloatArray, faces: bodies.IntArray) -> str:
         "o human",
     ]
     lines += [f"v {x:.6f} {z:.6f} {-y:.6f}" for x, y, z in points]
+    lines.append("s 1")  # smooth shading
     lines += ["f " + " ".join(map(str, face)) for face in (faces + 1).tolist()]
     return "\n".join(lines) + "\n"
 
