@@ -4,8 +4,13 @@
 #include <cblas.h>
 
 #include <string>
+#include <vector>
 
 #include "supple/core/error.h"
+
+extern "C" void dsyevd_(const char* jobz, const char* uplo, const int* n, double* a, const int* lda,
+                        double* w, double* work, const int* lwork, int* iwork, const int* liwork,
+                        int* info);
 
 namespace supple {
 namespace {
@@ -53,6 +58,33 @@ void gemm(Scalar alpha, const RowMatrix<Scalar>& a, Op op_a, const RowMatrix<Sca
   call(blas(op_a), blas(op_b), static_cast<int>(m), static_cast<int>(n), static_cast<int>(k), alpha,
        a.data(), static_cast<int>(a.cols()), b.data(), static_cast<int>(b.cols()), beta, c.data(),
        static_cast<int>(n));
+}
+
+std::string blas_name() { return openblas_get_config(); }
+
+Eigen::VectorXd symmetric_eigen(Eigen::MatrixXd& matrix) {
+  const int n = static_cast<int>(matrix.rows());
+  Eigen::VectorXd values(n);
+  if (n == 0) {
+    return values;
+  }
+  int info = 0, wanted_integers = 0;
+  const int ask = -1;
+  double wanted = 0.0;
+  dsyevd_("V", "L", &n, matrix.data(), &n, values.data(), &wanted, &ask, &wanted_integers, &ask,
+          &info);
+  std::vector<double> work(static_cast<size_t>(wanted));
+  std::vector<int> integers(static_cast<size_t>(wanted_integers));
+  const int work_size = static_cast<int>(work.size()),
+            integer_size = static_cast<int>(integers.size());
+  dsyevd_("V", "L", &n, matrix.data(), &n, values.data(), work.data(), &work_size, integers.data(),
+          &integer_size, &info);
+  if (info != 0) {
+    throw Error(ErrorCode::no_convergence,
+                "The eigenvalues of a " + std::to_string(n) + " x " + std::to_string(n) +
+                    " matrix did not converge. Its numbers are not finite or far too large.");
+  }
+  return values;
 }
 
 template void gemm<float>(float, const RowMatrix<float>&, Op, const RowMatrix<float>&, Op, float,

@@ -9,58 +9,59 @@
 namespace supple {
 namespace {
 
-// Position of each index among the free ones, or -1 - (position among the held).
-Eigen::VectorXi slots(Eigen::Index n, const Eigen::VectorXi& held) {
-  Eigen::VectorXi slot = Eigen::VectorXi::Zero(n);
+// Position of each row among the held, or -1.
+Eigen::VectorXi held_slots(Eigen::Index n, const Eigen::VectorXi& held) {
+  Eigen::VectorXi slot = Eigen::VectorXi::Constant(n, -1);
   for (Eigen::Index i = 0; i < held.size(); ++i) {
     if (held[i] < 0 || held[i] >= n) {
       throw Error(ErrorCode::index_out_of_range, "Held row " + std::to_string(held[i]) +
                                                      " is not in a system of " + std::to_string(n) +
                                                      " rows.");
     }
-    if (slot[held[i]] < 0) {
+    if (slot[held[i]] >= 0) {
       throw Error(ErrorCode::overlapping_handles,
                   "Held row " + std::to_string(held[i]) + " is listed twice.");
     }
-    slot[held[i]] = -1 - static_cast<int>(i);
-  }
-  int next = 0;
-  for (Eigen::Index i = 0; i < n; ++i) {
-    if (slot[i] == 0) {
-      slot[i] = next++;
-    }
+    slot[held[i]] = static_cast<int>(i);
   }
   return slot;
 }
 
-SparseMatrix block(const SparseMatrix& matrix, const Eigen::VectorXi& slot, Eigen::Index rows,
-                   Eigen::Index cols, bool held_columns) {
+// n x held: the columns of the held rows, without the held rows themselves.
+SparseMatrix coupling_of(const SparseMatrix& matrix, const Eigen::VectorXi& held) {
+  const Eigen::VectorXi slot = held_slots(matrix.rows(), held);
   std::vector<Eigen::Triplet<double>> entries;
-  entries.reserve(static_cast<size_t>(matrix.nonZeros()));
-  for (int c = 0; c < matrix.outerSize(); ++c) {
-    if ((slot[c] < 0) != held_columns) {
-      continue;
-    }
-    const int column = held_columns ? -1 - slot[c] : slot[c];
-    for (SparseMatrix::InnerIterator it(matrix, c); it; ++it) {
-      if (slot[it.row()] >= 0) {
-        entries.emplace_back(slot[it.row()], column, it.value());
+  for (int h = 0; h < held.size(); ++h) {
+    for (SparseMatrix::InnerIterator it(matrix, held[h]); it; ++it) {
+      if (slot[it.row()] < 0) {
+        entries.emplace_back(static_cast<int>(it.row()), h, it.value());
       }
     }
   }
-  SparseMatrix result(rows, cols);
+  SparseMatrix result(matrix.rows(), held.size());
   result.setFromTriplets(entries.begin(), entries.end());
   return result;
 }
 
-Eigen::VectorXi free_indices(Eigen::Index n, const Eigen::VectorXi& slot, Eigen::Index held) {
-  Eigen::VectorXi indices(n - held);
-  for (int i = 0; i < n; ++i) {
-    if (slot[i] >= 0) {
-      indices[slot[i]] = i;
+// The matrix with the held rows and columns set to those of a diagonal one. Its pattern stays, so
+// that one analysis serves every set of held rows.
+SparseMatrix with_held_rows(const SparseMatrix& matrix, const Eigen::VectorXi& held) {
+  const Eigen::VectorXi slot = held_slots(matrix.rows(), held);
+  SparseMatrix result = matrix;
+  for (int c = 0; c < result.outerSize(); ++c) {
+    for (SparseMatrix::InnerIterator it(result, c); it; ++it) {
+      if (slot[it.row()] >= 0 || slot[c] >= 0) {
+        it.valueRef() = it.row() != c ? 0.0 : it.value() > 0.0 ? it.value() : 1.0;
+      }
     }
   }
-  return indices;
+  return result;
+}
+
+std::shared_ptr<const SymbolicCholesky> or_own(std::shared_ptr<const SymbolicCholesky> symbolic,
+                                               const SparseMatrix& matrix) {
+  return symbolic != nullptr ? std::move(symbolic)
+                             : std::make_shared<const SymbolicCholesky>(matrix);
 }
 
 Eigen::VectorXi first_of_each(const Eigen::VectorXi& component, int count) {
@@ -76,24 +77,18 @@ Eigen::VectorXi first_of_each(const Eigen::VectorXi& component, int count) {
 }  // namespace
 
 HeldSystem::HeldSystem(const SparseMatrix& matrix, const Eigen::VectorXi& held,
-                       SparseCholesky::Backend backend)
+                       std::shared_ptr<const SymbolicCholesky> symbolic)
     : held_(held),
-      free_(free_indices(matrix.rows(), slots(matrix.rows(), held), held.size())),
-      coupling_(block(matrix, slots(matrix.rows(), held), free_.size(), held.size(), true)),
-      factor_(block(matrix, slots(matrix.rows(), held), free_.size(), free_.size(), false),
-              backend) {}
+      coupling_(coupling_of(matrix, held)),
+      factor_(with_held_rows(matrix, held), or_own(std::move(symbolic), matrix)) {}
 
 Points HeldSystem::solve(const Points& rhs, const Points& held_values) const {
-  Eigen::MatrixXd reduced(free_.size(), 3);
-  for (Eigen::Index i = 0; i < free_.size(); ++i) {
-    reduced.row(i) = rhs.row(free_[i]);
-  }
+  RowMatrix<double> reduced = rhs;
   reduced.noalias() -= coupling_ * held_values;
-  const Eigen::MatrixXd solution = factor_.solve(reduced);
-  Points result(rhs.rows(), 3);
-  for (Eigen::Index i = 0; i < free_.size(); ++i) {
-    result.row(free_[i]) = solution.row(i);
+  for (const int row : held_) {
+    reduced.row(row).setZero();
   }
+  Points result = factor_.solve(reduced);
   for (Eigen::Index i = 0; i < held_.size(); ++i) {
     result.row(held_[i]) = held_values.row(i);
   }
@@ -101,24 +96,24 @@ Points HeldSystem::solve(const Points& rhs, const Points& held_values) const {
 }
 
 Points HeldSystem::solve_backward(const Points& grad) const {
-  Eigen::MatrixXd reduced(free_.size(), 3);
-  for (Eigen::Index i = 0; i < free_.size(); ++i) {
-    reduced.row(i) = grad.row(free_[i]);
+  RowMatrix<double> reduced = grad;
+  for (const int row : held_) {
+    reduced.row(row).setZero();
   }
-  const Eigen::MatrixXd solution = factor_.solve(reduced);
-  Points result = Points::Zero(grad.rows(), 3);
-  for (Eigen::Index i = 0; i < free_.size(); ++i) {
-    result.row(free_[i]) = solution.row(i);
+  Points result = factor_.solve(reduced);
+  for (const int row : held_) {
+    result.row(row).setZero();
   }
   return result;
 }
 
 FreePoisson::FreePoisson(const SparseMatrix& laplacian, const Eigen::VectorXd& mass,
-                         const Eigen::VectorXi& component, int component_count)
+                         const Eigen::VectorXi& component, int component_count,
+                         std::shared_ptr<const SymbolicCholesky> symbolic)
     : mass_(mass),
       component_(component),
       component_mass_(Eigen::VectorXd::Zero(component_count)),
-      pinned_(laplacian, first_of_each(component, component_count)) {
+      pinned_(laplacian, first_of_each(component, component_count), std::move(symbolic)) {
   for (Eigen::Index i = 0; i < component_.size(); ++i) {
     component_mass_[component_[i]] += mass_[i];
   }

@@ -1,75 +1,95 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "supple/geometry/sparse_cholesky.h"
 
-#ifdef SUPPLE_WITH_CHOLMOD
-#include <Eigen/CholmodSupport>
-#endif
+#include <Eigen/OrderingMethods>
 #include <Eigen/SparseCholesky>
-#include <mutex>
 #include <string>
 
+#include "factor.h"
 #include "supple/core/error.h"
 
 namespace supple {
 namespace {
 
-class Factor {
+using Permutation = Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int>;
+
+// A = P^T L D L^T P with an ordering P that is given from outside.
+class EigenFactor : public Factor {
  public:
-  virtual ~Factor() = default;
-  virtual Eigen::MatrixXd solve(const Eigen::MatrixXd& rhs) const = 0;
+  EigenFactor(const SparseMatrix& matrix, const Eigen::VectorXi& ordering) : place_(ordering) {
+    SparseMatrix ordered(matrix.rows(), matrix.cols());
+    ordered.selfadjointView<Eigen::Lower>() =
+        matrix.selfadjointView<Eigen::Lower>().twistedBy(place_.inverse());
+    factor_.compute(ordered);
+    // LDL^T also factors indefinite matrices; a definite one has a positive D.
+    if (factor_.info() != Eigen::Success || !(factor_.vectorD().array() > 0.0).all()) {
+      throw_not_definite(matrix.rows());
+    }
+  }
+  Eigen::Index entries() const override {
+    return factor_.matrixL().nestedExpression().nonZeros() + factor_.vectorD().size();
+  }
+  RowMatrix<double> solve(const RowMatrix<double>& rhs) const override {
+    const Eigen::MatrixXd ordered = place_.inverse() * rhs;
+    return place_ * factor_.solve(ordered);
+  }
+
+ private:
+  Permutation place_;
+  Eigen::SimplicialLDLT<SparseMatrix, Eigen::Lower, Eigen::NaturalOrdering<int>> factor_;
 };
 
-void check(Eigen::ComputationInfo info, Eigen::Index n) {
-  if (info != Eigen::Success) {
-    throw Error(ErrorCode::not_positive_definite,
-                "The " + std::to_string(n) + " x " + std::to_string(n) +
-                    " system is not positive definite and cannot be factored.");
+Eigen::VectorXi amd_ordering(const SparseMatrix& pattern) {
+  Permutation inverse;
+  Eigen::AMDOrdering<int>()(pattern.selfadjointView<Eigen::Lower>(), inverse);
+  return inverse.indices();
+}
+
+void check_square(const SparseMatrix& matrix) {
+  if (matrix.rows() != matrix.cols()) {
+    throw Error(ErrorCode::wrong_shape, "The system is " + std::to_string(matrix.rows()) + " x " +
+                                            std::to_string(matrix.cols()) + "; it must be square.");
   }
 }
 
-class EigenFactor : public Factor {
- public:
-  explicit EigenFactor(const SparseMatrix& matrix) : factor_(matrix) {
-    check(factor_.info(), matrix.rows());
-    // LDL^T also factors indefinite matrices; a definite one has a positive D.
-    check((factor_.vectorD().array() > 0.0).all() ? Eigen::Success : Eigen::NumericalIssue,
-          matrix.rows());
+void check_ordering(const Eigen::VectorXi& ordering, Eigen::Index n) {
+  std::vector<bool> seen(static_cast<size_t>(n), false);
+  bool right = ordering.size() == n;
+  for (Eigen::Index i = 0; right && i < n; ++i) {
+    right = ordering[i] >= 0 && ordering[i] < n && !seen[static_cast<size_t>(ordering[i])];
+    if (right) {
+      seen[static_cast<size_t>(ordering[i])] = true;
+    }
   }
-  Eigen::MatrixXd solve(const Eigen::MatrixXd& rhs) const override { return factor_.solve(rhs); }
-
- private:
-  Eigen::SimplicialLDLT<SparseMatrix> factor_;
-};
-
-#ifdef SUPPLE_WITH_CHOLMOD
-class CholmodFactor : public Factor {
- public:
-  explicit CholmodFactor(const SparseMatrix& matrix) {
-    factor_.cholmod().print = 0;  // failures become errors, not text
-    factor_.cholmod().final_ll = 1;
-    factor_.compute(matrix);
-    check(factor_.info(), matrix.rows());
+  if (!right) {
+    throw Error(ErrorCode::bad_option, "The ordering given for a system of " + std::to_string(n) +
+                                           " rows does not name each of them once.");
   }
-  Eigen::MatrixXd solve(const Eigen::MatrixXd& rhs) const override {
-    const std::lock_guard lock(mutex_);  // CHOLMOD's workspace belongs to one solve at a time
-    return factor_.solve(rhs);
-  }
-
- private:
-  mutable std::mutex mutex_;
-  Eigen::CholmodDecomposition<SparseMatrix> factor_;
-};
-#endif
+}
 
 }  // namespace
 
-struct SparseCholesky::Impl {
-  Eigen::Index size = 0;
+void throw_not_definite(Eigen::Index n) {
+  throw Error(ErrorCode::not_positive_definite,
+              "The " + std::to_string(n) + " x " + std::to_string(n) +
+                  " system is not positive definite and cannot be factored.");
+}
+
+struct SymbolicCholesky::Impl {
   Backend backend = Backend::eigen;
-  std::unique_ptr<Factor> factor;
+  Eigen::Index size = 0, entries = 0;
+  Eigen::VectorXi ordering;
+#ifdef SUPPLE_WITH_CHOLMOD
+  std::unique_ptr<const CholmodSymbolic> cholmod;
+#endif
 };
 
-bool SparseCholesky::available(Backend backend) {
+struct SparseCholesky::Impl {
+  std::shared_ptr<const SymbolicCholesky> symbolic;
+  std::unique_ptr<const Factor> factor;  // none for 0 x 0
+};
+
+bool SymbolicCholesky::available(Backend backend) {
 #ifdef SUPPLE_WITH_CHOLMOD
   return backend == Backend::cholmod || backend == Backend::eigen;
 #else
@@ -77,51 +97,92 @@ bool SparseCholesky::available(Backend backend) {
 #endif
 }
 
-SparseCholesky::Backend SparseCholesky::default_backend() {
+SymbolicCholesky::Backend SymbolicCholesky::default_backend() {
   return available(Backend::cholmod) ? Backend::cholmod : Backend::eigen;
 }
 
-SparseCholesky::SparseCholesky(const SparseMatrix& matrix, Backend backend)
-    : impl_(std::make_unique<Impl>()) {
+SymbolicCholesky::SymbolicCholesky(const SparseMatrix& pattern, Backend backend,
+                                   const Eigen::VectorXi& ordering) {
   if (!available(backend)) {
     throw Error(ErrorCode::bad_option,
                 "This build has no CHOLMOD. Use the Eigen backend or build with SuiteSparse.");
   }
-  if (matrix.rows() != matrix.cols()) {
-    throw Error(ErrorCode::wrong_shape, "The system is " + std::to_string(matrix.rows()) + " x " +
-                                            std::to_string(matrix.cols()) + "; it must be square.");
+  check_square(pattern);
+  if (ordering.size() > 0) {
+    check_ordering(ordering, pattern.rows());
   }
-  if (matrix.rows() > 0 && matrix.nonZeros() == 0) {
-    check(Eigen::NumericalIssue, matrix.rows());  // CHOLMOD cannot be shown an empty pattern
-  }
-  impl_->size = matrix.rows();
-  impl_->backend = backend;
-  if (matrix.rows() == 0) {
-    return;
-  }
+  auto impl = std::make_unique<Impl>();
+  impl->backend = backend;
+  impl->size = pattern.rows();
+  impl->entries = pattern.nonZeros();
+  impl->ordering = ordering;
+  if (pattern.nonZeros() > 0) {  // CHOLMOD cannot be shown an empty pattern
 #ifdef SUPPLE_WITH_CHOLMOD
-  if (backend == Backend::cholmod) {
-    impl_->factor = std::make_unique<CholmodFactor>(matrix);
-    return;
-  }
+    if (backend == Backend::cholmod) {
+      impl->cholmod = std::make_unique<const CholmodSymbolic>(pattern, ordering);
+      impl->ordering = impl->cholmod->ordering();
+    }
 #endif
-  impl_->factor = std::make_unique<EigenFactor>(matrix);
+    if (backend == Backend::eigen && ordering.size() == 0) {
+      impl->ordering = amd_ordering(pattern);
+    }
+  }
+  impl_ = std::move(impl);
+}
+
+SymbolicCholesky::~SymbolicCholesky() = default;
+SymbolicCholesky::Backend SymbolicCholesky::backend() const { return impl_->backend; }
+Eigen::Index SymbolicCholesky::size() const { return impl_->size; }
+const Eigen::VectorXi& SymbolicCholesky::ordering() const { return impl_->ordering; }
+
+SparseCholesky::SparseCholesky(const SparseMatrix& matrix, Backend backend)
+    : SparseCholesky(matrix, std::make_shared<const SymbolicCholesky>(matrix, backend)) {}
+
+SparseCholesky::SparseCholesky(const SparseMatrix& matrix,
+                               std::shared_ptr<const SymbolicCholesky> symbolic) {
+  check_square(matrix);
+  const SymbolicCholesky::Impl& shared = *symbolic->impl_;
+  if (matrix.rows() != shared.size || matrix.nonZeros() != shared.entries) {
+    throw Error(ErrorCode::wrong_shape,
+                "The system has " + std::to_string(matrix.rows()) + " rows and " +
+                    std::to_string(matrix.nonZeros()) + " entries, the pattern it is to share " +
+                    std::to_string(shared.size) + " and " + std::to_string(shared.entries) + ".");
+  }
+  auto impl = std::make_unique<Impl>();
+  if (matrix.rows() > 0) {
+    if (matrix.nonZeros() == 0) {
+      throw_not_definite(matrix.rows());
+    }
+#ifdef SUPPLE_WITH_CHOLMOD
+    if (shared.backend == Backend::cholmod) {
+      impl->factor = shared.cholmod->factor(matrix);
+    }
+#endif
+    if (shared.backend == Backend::eigen) {
+      impl->factor = std::make_unique<const EigenFactor>(matrix, shared.ordering);
+    }
+  }
+  impl->symbolic = std::move(symbolic);
+  impl_ = std::move(impl);
 }
 
 SparseCholesky::~SparseCholesky() = default;
 SparseCholesky::SparseCholesky(SparseCholesky&&) noexcept = default;
 SparseCholesky& SparseCholesky::operator=(SparseCholesky&&) noexcept = default;
 
-Eigen::Index SparseCholesky::size() const { return impl_->size; }
-SparseCholesky::Backend SparseCholesky::backend() const { return impl_->backend; }
+Eigen::Index SparseCholesky::size() const { return impl_->symbolic->size(); }
+SparseCholesky::Backend SparseCholesky::backend() const { return impl_->symbolic->backend(); }
+Eigen::Index SparseCholesky::factor_entries() const {
+  return impl_->factor == nullptr ? 0 : impl_->factor->entries();
+}
 
-Eigen::MatrixXd SparseCholesky::solve(const Eigen::MatrixXd& rhs) const {
-  if (rhs.rows() != impl_->size) {
-    throw Error(ErrorCode::wrong_shape, "The system has " + std::to_string(impl_->size) +
+RowMatrix<double> SparseCholesky::solve(const RowMatrix<double>& rhs) const {
+  if (rhs.rows() != size()) {
+    throw Error(ErrorCode::wrong_shape, "The system has " + std::to_string(size()) +
                                             " rows, the right-hand side " +
                                             std::to_string(rhs.rows()) + ".");
   }
-  return impl_->size == 0 ? rhs : impl_->factor->solve(rhs);
+  return impl_->factor == nullptr || rhs.cols() == 0 ? rhs : impl_->factor->solve(rhs);
 }
 
 }  // namespace supple

@@ -1,150 +1,143 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "supple/spectral/eigenbasis.h"
 
-#include <Spectra/SymEigsSolver.h>
-
-#include <Eigen/Eigenvalues>
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <sstream>
 #include <string>
+#include <utility>
 
+#include "block_krylov.h"
+#include "eigenproblem.h"
+#include "lanczos.h"
+#include "multiresolution.h"
 #include "supple/core/dense.h"
 #include "supple/core/error.h"
-#include "supple/geometry/sparse_cholesky.h"
 
 namespace supple {
 namespace {
 
 // Eigenvalues closer than this, relative to their size, count as one.
 constexpr double kMultiple = 1e-4;
+// Copies of an eigenvalue closer than this are told apart by rounding alone.
+constexpr double kSame = 1e-7;
+// From here, an exact basis takes gigabytes and a minute.
+constexpr Eigen::Index kLarge = 250000;
 
-// (M^-1/2 W M^-1/2 + shift)^-1 minus what is already found: the operator whose largest eigenvalues
-// are the wanted ones. Its only input from Spectra is a vector.
-class ShiftInvert {
- public:
-  using Scalar = double;
-  ShiftInvert(const SparseCholesky& factor, const Eigen::VectorXd& root_mass,
-              const Eigen::MatrixXd& found, const ProgressRange& progress, int expected)
-      : factor_(factor),
-        root_mass_(root_mass),
-        found_(found),
-        progress_(progress),
-        expected_(expected) {}
-
-  Eigen::Index rows() const { return root_mass_.size(); }
-  Eigen::Index cols() const { return root_mass_.size(); }
-  void perform_op(const double* in, double* out) const {
-    progress_.report(std::min(0.95, double(++applied_) / expected_));
-    Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(in, rows());
-    deflate(x);
-    Eigen::VectorXd y = root_mass_.cwiseProduct(factor_.solve(root_mass_.cwiseProduct(x)).col(0));
-    deflate(y);
-    Eigen::Map<Eigen::VectorXd>(out, rows()) = y;
-  }
-
- private:
-  void deflate(Eigen::VectorXd& x) const {
-    if (found_.cols() > 0) {
-      x -= found_ * (found_.transpose() * x);
-    }
-  }
-  const SparseCholesky& factor_;
-  const Eigen::VectorXd& root_mass_;
-  const Eigen::MatrixXd& found_;
-  const ProgressRange& progress_;
-  int expected_;
-  mutable int applied_ = 0;
+constexpr std::pair<EigenMethod, const char*> kMethods[] = {
+    {EigenMethod::automatic, "automatic"},
+    {EigenMethod::block_krylov, "block_krylov"},
+    {EigenMethod::multiresolution, "multiresolution"},
+    {EigenMethod::lanczos, "lanczos"},
+    {EigenMethod::dense, "dense"},
 };
 
-SparseMatrix shifted(const SparseMatrix& laplacian, const Eigen::VectorXd& mass, double shift) {
-  SparseMatrix result = laplacian;
-  result.diagonal() += shift * mass;
-  return result;
-}
+// With few vertices, all eigenvalues are found sooner than some.
+bool small_enough_for_dense(Eigen::Index n, Eigen::Index count) { return n <= 4 * count + 64; }
 
-// Number of eigenvalues below `value`, by the signs of D in W - value M = L D L^T; -1 if that
-// fails.
-Eigen::Index count_below(const SparseMatrix& laplacian, const Eigen::VectorXd& mass, double value) {
-  const Eigen::SimplicialLDLT<SparseMatrix> factor(shifted(laplacian, mass, -value));
-  if (factor.info() != Eigen::Success) {
-    return -1;
+EigenMethod chosen(EigenMethod asked, Eigen::Index n, Eigen::Index count) {
+  if (small_enough_for_dense(n, count)) {
+    return EigenMethod::dense;
   }
-  return (factor.vectorD().array() < 0.0).count();
-}
-
-struct Pairs {
-  Eigen::VectorXd values;   // ascending
-  Eigen::MatrixXd vectors;  // of M^-1/2 W M^-1/2, orthonormal
-};
-
-// Rayleigh-Ritz in the span of `vectors` (made orthonormal), ascending.
-Pairs rayleigh_ritz(const SparseMatrix& symmetric, const Eigen::MatrixXd& vectors) {
-  if (vectors.cols() == 0) {
-    return {Eigen::VectorXd(0), vectors};
+  if (asked != EigenMethod::automatic) {
+    return asked;
   }
-  const Eigen::MatrixXd q = Eigen::HouseholderQR<Eigen::MatrixXd>(vectors).householderQ() *
-                            Eigen::MatrixXd::Identity(vectors.rows(), vectors.cols());
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> small(q.transpose() * (symmetric * q));
-  return {small.eigenvalues(), q * small.eigenvectors()};
+  return n >= kLarge ? EigenMethod::multiresolution : EigenMethod::block_krylov;
 }
 
 Pairs dense_pairs(const SparseMatrix& symmetric, Eigen::Index count) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver{Eigen::MatrixXd(symmetric)};
-  return {solver.eigenvalues().head(count), solver.eigenvectors().leftCols(count)};
+  Eigen::MatrixXd vectors = symmetric;
+  const Eigen::VectorXd values = symmetric_eigen(vectors);
+  return {values.head(count), vectors.leftCols(count)};
 }
 
-Eigen::MatrixXd lanczos(const SparseCholesky& factor, const Eigen::VectorXd& root_mass,
-                        const Eigen::MatrixXd& found, Eigen::Index count,
-                        const EigenbasisOptions& options, const ProgressRange& progress) {
-  const Eigen::Index n = root_mass.size();
-  const Eigen::Index krylov = std::min(n - found.cols(), std::max<Eigen::Index>(2 * count, 20));
-  ShiftInvert op(factor, root_mass, found, progress, static_cast<int>(2 * krylov));
-  Spectra::SymEigsSolver<ShiftInvert> solver(op, count, krylov);
-  solver.init();  // a fixed pseudo-random start: the same bytes every time
-  solver.compute(Spectra::SortRule::LargestAlge, options.max_iterations, 1e-13,
-                 Spectra::SortRule::LargestAlge);
-  // Not asking for Success: 1e-13 is a wish; what counts is the residual checked by the caller.
-  const Eigen::MatrixXd found_now = solver.eigenvectors(count);  // the converged ones only
-  return found_now.cols() > 0 ? found_now : Eigen::MatrixXd(n, 0);
-}
-
-// How many pairs are still to be found: up to `count`, and below the last of those found.
-Eigen::Index count_missing(const SparseMatrix& laplacian, const Eigen::VectorXd& mass,
-                           const Pairs& pairs, Eigen::Index count) {
-  if (pairs.values.size() < count) {
-    return count - pairs.values.size();
-  }
-  const double top = pairs.values[count - 1] * (1.0 - kMultiple);
-  const Eigen::Index found = (pairs.values.array() < top).count();
-  return std::max<Eigen::Index>(count_below(laplacian, mass, top) - found, 0);
-}
-
-double worst_residual(const SparseMatrix& symmetric, const Pairs& pairs) {
-  const Eigen::MatrixXd r = symmetric * pairs.vectors - pairs.vectors * pairs.values.asDiagonal();
-  double worst = 0.0;
-  for (Eigen::Index i = 0; i < r.cols(); ++i) {
-    worst = std::max(worst, r.col(i).norm() / std::max(pairs.values[i], 1.0));
-  }
-  return worst;
-}
-
-// What rounding alone leaves of a residual: slivers make the matrix's norm, and this, large.
-double rounding_floor(const SparseMatrix& symmetric) {
-  double largest_column = 0.0;
-  for (int c = 0; c < symmetric.outerSize(); ++c) {
-    double sum = 0.0;
-    for (SparseMatrix::InnerIterator it(symmetric, c); it; ++it) {
-      sum += std::abs(it.value());
+// The pairs of both, ascending, the first `count` of them.
+Pairs merged(const Pairs& a, const Pairs& b, Eigen::Index count) {
+  Pairs result;
+  count = std::min(count, a.size() + b.size());
+  result.values.resize(count);
+  result.vectors.resize(a.vectors.rows(), count);
+  for (Eigen::Index i = 0, j = 0; i + j < count;) {
+    const Eigen::Index to = i + j;
+    if (j == b.size() || (i < a.size() && a.values[i] <= b.values[j])) {
+      result.values[to] = a.values[i];
+      result.vectors.col(to) = a.vectors.col(i++);
+    } else {
+      result.values[to] = b.values[j];
+      result.vectors.col(to) = b.vectors.col(j++);
     }
-    largest_column = std::max(largest_column, sum);
   }
-  return 16.0 * std::numeric_limits<double>::epsilon() * largest_column;
+  return result;
 }
+
+// The most copies of one eigenvalue.
+Eigen::Index most_copies(const Eigen::VectorXd& values) {
+  Eigen::Index most = 0, first = 0;
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    if (values[i] - values[first] > kSame * std::max(values[i], 1.0)) {
+      first = i;
+    }
+    most = std::max(most, i - first + 1);
+  }
+  return most;
+}
+
+// All pairs but the kernel's. A block method finds as many copies of an eigenvalue as a block has
+// vectors, a single vector finds one by right and more by rounding: the rest is in the complement.
+Pairs krylov_pairs(const Eigenproblem& problem, Eigen::Index count,
+                   const EigenbasisOptions& options, EigenMethod method,
+                   const ProgressRange& progress) {
+  const bool single = method == EigenMethod::lanczos;
+  const auto search = [&](const RowMatrix<double>& locked, Eigen::Index wanted, uint64_t seed) {
+    return single ? lanczos(problem, locked, wanted, options.max_restarts, progress)
+                  : block_krylov(problem, locked,
+                                 {.count = wanted,
+                                  .tolerance = 0.4 * options.residual,
+                                  .max_restarts = options.max_restarts,
+                                  .seed = seed},
+                                 progress);
+  };
+  Pairs found = search(RowMatrix<double>(problem.size(), 0), count, 1);
+  const Eigen::Index together = single ? 1 : block_width(count);
+  for (uint64_t seed = 2; found.size() < count || most_copies(found.values) >= together; ++seed) {
+    const Eigen::Index left = problem.size() - problem.kernel_size() - found.size();
+    if (left < 4 || seed > 40) {
+      break;
+    }
+    const Pairs more = search(found.vectors, std::min<Eigen::Index>(left / 4, 4), seed);
+    if (more.size() == 0 ||
+        (found.size() == count && more.values[0] >= found.values[count - 1] * (1.0 - kSame))) {
+      break;
+    }
+    found = merged(found, more, count);
+  }
+  return found;
+}
+
+std::string advice() { return ". Remove slivers from the mesh or ask for fewer functions."; }
 
 }  // namespace
+
+const char* to_string(EigenMethod method) {
+  for (const auto& [value, name] : kMethods) {
+    if (value == method) {
+      return name;
+    }
+  }
+  return "";
+}
+
+EigenMethod eigen_method(const std::string& name) {
+  for (const auto& [value, known] : kMethods) {
+    if (name == known) {
+      return value;
+    }
+  }
+  throw Error(ErrorCode::bad_option,
+              "'" + name +
+                  "' is no way to find eigenfunctions. Use 'automatic', 'block_krylov', "
+                  "'multiresolution', 'lanczos' or 'dense'.");
+}
 
 RowMatrix<double> Eigenbasis::coefficients(const RowMatrix<double>& field,
                                            Eigen::Index count) const {
@@ -194,62 +187,59 @@ Eigen::Index stable_count(const Eigenbasis& a, const Eigenbasis& b, Eigen::Index
 }
 
 Eigenbasis eigenbasis(const SparseMatrix& laplacian, const Eigen::VectorXd& mass,
-                      const EigenbasisOptions& options, ProgressRange progress) {
-  const Eigen::Index n = mass.size();
+                      const EigenbasisOptions& options, ProgressRange progress,
+                      std::shared_ptr<const SymbolicCholesky> symbolic) {
   if (options.count < 1) {
     throw Error(ErrorCode::bad_option, "The number of eigenfunctions must be at least 1, not " +
                                            std::to_string(options.count) + ".");
   }
+  const Eigen::Index n = mass.size();
   const Eigen::Index count = std::min<Eigen::Index>(options.count, n);
-  const Eigen::VectorXd root_mass = mass.cwiseSqrt();
-  const Eigen::VectorXd inverse_root = root_mass.cwiseInverse();
-  const SparseMatrix symmetric = inverse_root.asDiagonal() * laplacian * inverse_root.asDiagonal();
-
-  Pairs pairs;
-  if (n <= std::max<Eigen::Index>(3 * count, 64)) {
-    pairs = dense_pairs(symmetric, count);
-  } else {
-    // Of the order of the second eigenvalue, so that the factor stays well conditioned.
-    const double shift = 1.0 / mass.sum();
-    const SparseCholesky factor(shifted(laplacian, mass, shift));
-    pairs = rayleigh_ritz(
-        symmetric, lanczos(factor, root_mass, Eigen::MatrixXd(n, 0), count, options, progress));
-    // Lanczos can leave pairs out: those that did not converge, and copies of a multiple
-    // eigenvalue. Look for them in the complement.
-    for (int attempt = 0; attempt < 3; ++attempt) {
-      const Eigen::Index missing = count_missing(laplacian, mass, pairs, count);
-      if (missing == 0) {
-        break;
-      }
-      const Eigen::Index wanted = std::min<Eigen::Index>(missing + 2, n - pairs.vectors.cols() - 1);
-      const Eigen::MatrixXd more =
-          lanczos(factor, root_mass, pairs.vectors, wanted, options, progress);
-      Eigen::MatrixXd joined(n, pairs.vectors.cols() + more.cols());
-      joined << pairs.vectors, more;
-      pairs = rayleigh_ritz(symmetric, joined);
-    }
-    if (pairs.values.size() < count) {
-      throw Error(ErrorCode::no_convergence, "Only " + std::to_string(pairs.values.size()) +
-                                                 " of " + std::to_string(count) +
-                                                 " eigenfunctions reached their residual. Remove "
-                                                 "slivers from the mesh or ask for fewer "
-                                                 "functions.");
-    }
-    pairs.values.conservativeResize(count);
-    pairs.vectors.conservativeResize(n, count);
-  }
-
   Eigenbasis basis;
+  basis.method = chosen(options.method, n, count);
   basis.mass = mass;
-  basis.values = pairs.values.cwiseMax(0.0);
-  basis.functions = inverse_root.asDiagonal() * pairs.vectors;
-  basis.residual = worst_residual(symmetric, pairs);
-  const double reachable = std::max(options.residual, rounding_floor(symmetric));
+
+  const Eigenproblem problem(laplacian, mass, std::move(symbolic));
+  progress.report(0.05);
+  Pairs pairs;
+  if (basis.method == EigenMethod::dense) {
+    pairs = dense_pairs(problem.symmetric(), count);
+  } else {
+    RowMatrix<double> kernel = problem.kernel(count);
+    const Eigen::Index rest = count - kernel.cols();
+    const Pairs constants{Eigen::VectorXd::Zero(kernel.cols()), std::move(kernel)};
+    const ProgressRange work = progress.stage("eigenbasis", 0.05, 1.0);
+    if (rest == 0) {
+      pairs = constants;
+    } else if (basis.method == EigenMethod::multiresolution) {
+      pairs =
+          merged(constants, multiresolution(problem, rest, options.coarse_residual, work), count);
+    } else {
+      pairs = merged(constants, krylov_pairs(problem, rest, options, basis.method, work), count);
+    }
+  }
+  if (pairs.size() < count) {
+    throw Error(ErrorCode::no_convergence, "Only " + std::to_string(pairs.size()) + " of " +
+                                               std::to_string(count) +
+                                               " eigenfunctions reached their residual" + advice());
+  }
+  pairs.values = pairs.values.cwiseMax(0.0);
+  basis.residual = problem.residuals(pairs).maxCoeff();
+  const double wanted =
+      basis.method == EigenMethod::multiresolution ? options.coarse_residual : options.residual;
+  const double reachable = std::max(wanted, problem.rounding_floor());
   if (!(basis.residual <= reachable)) {
     std::ostringstream message;
     message << "The eigenbasis reached a residual of " << basis.residual << ", not " << reachable
-            << ". Remove slivers from the mesh or ask for fewer functions.";
+            << advice();
     throw Error(ErrorCode::no_convergence, message.str());
+  }
+  basis.values = std::move(pairs.values);
+  basis.functions = std::move(pairs.vectors);
+  const Eigen::VectorXd inverse_root = problem.root_mass().cwiseInverse();
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index i = 0; i < n; ++i) {
+    basis.functions.row(i) *= inverse_root[i];
   }
   progress.report(1.0);
   return basis;

@@ -10,7 +10,7 @@
 namespace supple {
 namespace {
 
-using Backend = SparseCholesky::Backend;
+using Backend = CholeskyBackend;
 
 // W + M of a mesh: definite, with the pattern every solve of the library has.
 SparseMatrix definite(const zoo::Mesh& mesh) {

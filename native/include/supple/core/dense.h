@@ -2,6 +2,8 @@
 // Dense matrix products through BLAS, whose kernels are chosen at run time for the processor.
 #pragma once
 
+#include <string>
+
 #include "supple/core/types.h"
 
 namespace supple {
@@ -28,5 +30,12 @@ template <class Scalar>
 RowMatrix<Scalar> product(const RowMatrix<Scalar>& a, const RowMatrix<Scalar>& b) {
   return product(a, Op::none, b, Op::none);
 }
+
+/// The BLAS that answers, and the kernels it chose for this processor ("OpenBLAS ... SkylakeX").
+std::string blas_name();
+
+/// Eigenvalues, ascending, and eigenvectors of a symmetric matrix, in place of it (columns), by
+/// LAPACK's divide and conquer. Errors: `no_convergence`.
+Eigen::VectorXd symmetric_eigen(Eigen::MatrixXd& matrix);
 
 }  // namespace supple

@@ -10,14 +10,16 @@ namespace supple {
 
 /// A symmetric positive semidefinite system A X = B in which some rows of X are given ("held").
 /// The Poisson and biharmonic solves of this library are all of this form. Factored once for a set
-/// of held rows; a solve is two back-substitutions.
+/// of held rows; a solve is two back-substitutions. Held rows stay in the matrix as rows of a
+/// diagonal one, so that one symbolic analysis serves every set of them.
 class HeldSystem {
  public:
   /// matrix: n x n, definite once the held rows are taken out. held: distinct indices in [0, n).
+  /// symbolic: of the matrix's pattern; nullptr to analyse it here.
   /// Errors: `index_out_of_range`, `overlapping_handles` (a row held twice),
-  /// `not_positive_definite`.
+  /// `not_positive_definite`; `wrong_shape` for another pattern's analysis.
   HeldSystem(const SparseMatrix& matrix, const Eigen::VectorXi& held,
-             SparseCholesky::Backend backend = SparseCholesky::default_backend());
+             std::shared_ptr<const SymbolicCholesky> symbolic = nullptr);
 
   const Eigen::VectorXi& held() const { return held_; }
   /// rhs: n x 3 (held rows ignored). held_values: one row for each held index, in `held` order.
@@ -27,8 +29,8 @@ class HeldSystem {
   Points solve_backward(const Points& grad) const;
 
  private:
-  Eigen::VectorXi held_, free_;
-  SparseMatrix coupling_;  // free x held block
+  Eigen::VectorXi held_;
+  SparseMatrix coupling_;  // n x held
   SparseCholesky factor_;
 };
 
@@ -36,9 +38,11 @@ class HeldSystem {
 /// mass-weighted centroid is 0. Source: the paper, Eqn 3.
 class FreePoisson {
  public:
-  /// laplacian: n x n; mass: n; component: n labels in [0, component_count).
+  /// laplacian: n x n; mass: n; component: n labels in [0, component_count); symbolic: of the
+  /// Laplacian's pattern; nullptr to analyse it here.
   FreePoisson(const SparseMatrix& laplacian, const Eigen::VectorXd& mass,
-              const Eigen::VectorXi& component, int component_count);
+              const Eigen::VectorXi& component, int component_count,
+              std::shared_ptr<const SymbolicCholesky> symbolic = nullptr);
 
   /// n x 3 to n x 3.
   Points solve(const Points& rhs) const;

@@ -7,33 +7,72 @@
 
 namespace supple {
 
-/// Factorisation of a sparse symmetric positive definite matrix, made once and solved with often.
-/// The only place that knows which library does it.
-class SparseCholesky {
+/// Which library orders and factors.
+enum class CholeskyBackend {
+  cholmod,  ///< CHOLMOD, supernodal; the default where it was built in
+  eigen,    ///< Eigen's SimplicialLDLT, always there
+};
+
+/// What factoring needs to know of a matrix's pattern: a fill-reducing ordering, the elimination
+/// tree, the supernodes. Found once a connectivity and shared by every matrix that has its pattern.
+/// Immutable.
+class SymbolicCholesky {
  public:
-  enum class Backend {
-    cholmod,  ///< CHOLMOD, supernodal where that pays; the default where it was built in
-    eigen,    ///< Eigen's SimplicialLDLT, always there
-  };
+  using Backend = CholeskyBackend;
+
+  /// pattern: n x n, symmetric, both triangles stored, explicit zeros counted; values are not read.
+  /// ordering: n, the row at each place; empty to look for one (AMD, and METIS where AMD leaves
+  /// much fill), which takes longer than all the rest.
+  /// Errors: `wrong_shape`; `bad_option` if the backend is not available or the ordering is no
+  /// permutation.
+  explicit SymbolicCholesky(const SparseMatrix& pattern, Backend backend = default_backend(),
+                            const Eigen::VectorXi& ordering = {});
+  ~SymbolicCholesky();
+
   static bool available(Backend backend);
   static Backend default_backend();
+
+  Backend backend() const;
+  Eigen::Index size() const;
+  /// n: the row at each place of the factor.
+  const Eigen::VectorXi& ordering() const;
+
+ private:
+  friend class SparseCholesky;
+  struct Impl;
+  std::unique_ptr<const Impl> impl_;
+};
+
+/// Factorisation of a sparse symmetric positive definite matrix, made once and solved with often.
+/// With `SymbolicCholesky`, the only place that knows which library does it. Immutable: safe to use
+/// from several threads.
+class SparseCholesky {
+ public:
+  using Backend = CholeskyBackend;
+  static bool available(Backend backend) { return SymbolicCholesky::available(backend); }
+  static Backend default_backend() { return SymbolicCholesky::default_backend(); }
 
   /// matrix: n x n, symmetric positive definite; both triangles stored.
   /// Errors: `not_positive_definite`; `wrong_shape` if not square; `bad_option` if the backend is
   /// not available.
   explicit SparseCholesky(const SparseMatrix& matrix, Backend backend = default_backend());
+  /// matrix: with the pattern that `symbolic` was made from. Errors: `not_positive_definite`;
+  /// `wrong_shape` for another number of rows or entries.
+  SparseCholesky(const SparseMatrix& matrix, std::shared_ptr<const SymbolicCholesky> symbolic);
   ~SparseCholesky();
   SparseCholesky(SparseCholesky&&) noexcept;
   SparseCholesky& operator=(SparseCholesky&&) noexcept;
 
   Eigen::Index size() const;
   Backend backend() const;
-  /// n x c right-hand sides to n x c solutions. Safe to call from several threads.
-  Eigen::MatrixXd solve(const Eigen::MatrixXd& rhs) const;
+  /// Entries of the factor, a measure of memory and of the time of a solve.
+  Eigen::Index factor_entries() const;
+  /// n x c right-hand sides to n x c solutions; columns are shared among the threads.
+  RowMatrix<double> solve(const RowMatrix<double>& rhs) const;
 
  private:
   struct Impl;
-  std::unique_ptr<Impl> impl_;
+  std::unique_ptr<const Impl> impl_;
 };
 
 }  // namespace supple

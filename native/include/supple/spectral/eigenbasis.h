@@ -1,10 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
+#include <string>
+
 #include "supple/core/progress.h"
 #include "supple/core/types.h"
+#include "supple/geometry/sparse_cholesky.h"
 
 namespace supple {
+
+/// How eigenfunctions are found.
+enum class EigenMethod {
+  automatic,        ///< `multiresolution` from 250,000 vertices, else `block_krylov`
+  block_krylov,     ///< shift-invert block Krylov-Schur on the Cholesky factor
+  multiresolution,  ///< a coarse basis, prolonged and corrected; residual 1e-2 instead of 1e-8
+  lanczos,          ///< shift-invert Lanczos by Spectra, the reference
+  dense,            ///< every eigenvalue; chosen by itself on small meshes, whatever is asked
+};
+const char* to_string(EigenMethod method);
+/// Errors: `bad_option` for any other name.
+EigenMethod eigen_method(const std::string& name);
 
 /// The first eigenfunctions of W phi = lambda M phi, smallest eigenvalues first.
 struct Eigenbasis {
@@ -13,6 +29,7 @@ struct Eigenbasis {
   Eigen::VectorXd mass;         ///< n, the diagonal of M
   /// Largest |M^-1/2 (W phi - lambda M phi)| / max(lambda, 1) over the pairs, checked on return.
   double residual = 0.0;
+  EigenMethod method = EigenMethod::automatic;  ///< the one that was used
 
   Eigen::Index size() const { return values.size(); }
   /// k' x c coefficients Phi^T M f of an n x c field in the first `count` functions.
@@ -33,17 +50,22 @@ Eigen::Index stable_count(const Eigenbasis& a, const Eigenbasis& b, Eigen::Index
 
 struct EigenbasisOptions {
   int count = 128;  ///< eigenfunctions wanted; min(count, n) are returned
-  /// The stated residual; where rounding alone leaves more (16 eps |M^-1/2 W M^-1/2|_1, slivers),
-  /// that.
+  EigenMethod method = EigenMethod::automatic;
+  /// The stated residual, not asked of `multiresolution`; where rounding alone leaves more (16 eps
+  /// |M^-1/2 W M^-1/2|_1, slivers), that.
   double residual = 1e-8;
-  int max_iterations = 200;  ///< Lanczos restarts
+  /// The residual that `multiresolution` is asked.
+  double coarse_residual = 1e-2;
+  int max_restarts = 50;
 };
 
-/// laplacian: n x n cotangent Laplacian; mass: n, positive. Shift-invert Lanczos (Spectra) on the
-/// Cholesky factor, dense below 3 * count vertices. Multiple eigenvalues (several components,
-/// symmetric shapes) are found whole: the number below the largest is checked by Sylvester's law of
-/// inertia. Errors: `no_convergence` with the residual reached; `cancelled`.
+/// laplacian: n x n cotangent Laplacian; mass: n, positive; symbolic: of the Laplacian's pattern,
+/// or nullptr. Multiple eigenvalues (several components, symmetric shapes) are found whole: the
+/// constants of the components are known, and where as many copies turn up as a block holds, the
+/// complement is searched for more. Errors: `no_convergence` with the residual reached;
+/// `cancelled`.
 Eigenbasis eigenbasis(const SparseMatrix& laplacian, const Eigen::VectorXd& mass,
-                      const EigenbasisOptions& options, ProgressRange progress = {});
+                      const EigenbasisOptions& options, ProgressRange progress = {},
+                      std::shared_ptr<const SymbolicCholesky> symbolic = nullptr);
 
 }  // namespace supple

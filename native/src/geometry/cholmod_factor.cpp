@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The CHOLMOD backend: its ordering, analysis and supernodal factor (Chen, Davis, Hager and
+// Rajamanickam 2008); the triangular solves are our own, see supernodal_solve.h.
+#ifdef SUPPLE_WITH_CHOLMOD
+
+#include <cholmod.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <new>
+#include <vector>
+
+#include "factor.h"
+#include "supernodal_solve.h"
+#include "supple/core/error.h"
+
+namespace supple {
+namespace {
+
+// Below this many operations, CHOLMOD's BLAS calls are so small that a second thread only costs.
+constexpr double kThreadedWork = 2e10;
+
+// One use of CHOLMOD: its workspace and messages.
+class Session {
+ public:
+  Session() {
+    cholmod_start(&common);
+    common.print = 0;  // failures become errors, not text
+    common.supernodal = CHOLMOD_SUPERNODAL;
+    common.final_ll = 1;
+    common.quick_return_if_not_posdef = 1;
+  }
+  ~Session() { cholmod_finish(&common); }
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+  cholmod_common common;
+};
+
+// Eigen's matrix as CHOLMOD's, sharing the arrays, of which it reads the lower triangle.
+cholmod_sparse view(const SparseMatrix& matrix) {
+  cholmod_sparse result{};
+  result.nrow = static_cast<size_t>(matrix.rows());
+  result.ncol = static_cast<size_t>(matrix.cols());
+  result.nzmax = static_cast<size_t>(matrix.nonZeros());
+  result.p = const_cast<int*>(matrix.outerIndexPtr());
+  result.i = const_cast<int*>(matrix.innerIndexPtr());
+  result.nz = const_cast<int*>(matrix.innerNonZeroPtr());
+  result.x = const_cast<double*>(matrix.valuePtr());
+  result.stype = -1;
+  result.itype = CHOLMOD_INT;
+  result.xtype = CHOLMOD_REAL;
+  result.dtype = CHOLMOD_DOUBLE;
+  result.sorted = 1;
+  result.packed = matrix.isCompressed() ? 1 : 0;
+  return result;
+}
+
+struct FreeFactor {
+  void operator()(cholmod_factor* factor) const {
+    Session session;
+    cholmod_free_factor(&factor, &session.common);
+  }
+};
+using FactorPointer = std::unique_ptr<cholmod_factor, FreeFactor>;
+
+void check_memory(const Session& session) {
+  if (session.common.status == CHOLMOD_OUT_OF_MEMORY ||
+      session.common.status == CHOLMOD_TOO_LARGE) {
+    throw std::bad_alloc();
+  }
+}
+
+struct FreeAligned {
+  void operator()(double* p) const { ::operator delete[](p, std::align_val_t(64)); }
+};
+using AlignedArray = std::unique_ptr<double[], FreeAligned>;
+AlignedArray aligned_array(size_t count) {
+  return AlignedArray(
+      static_cast<double*>(::operator new[](count * sizeof(double), std::align_val_t(64))));
+}
+
+// The widest panel that still gives each thread one, and no wider than needed.
+int panel_width(Eigen::Index columns, int threads) {
+  const Eigen::Index share = (columns + threads - 1) / threads;
+  return share <= 4 ? 4 : share <= 8 ? 8 : 16;
+}
+
+class CholmodFactor : public Factor {
+ public:
+  explicit CholmodFactor(FactorPointer factor) : factor_(std::move(factor)) {
+    view_.supernodes = static_cast<int>(factor_->nsuper);
+    view_.super = static_cast<const int*>(factor_->super);
+    view_.row_start = static_cast<const int*>(factor_->pi);
+    view_.value_start = static_cast<const int*>(factor_->px);
+    view_.rows = static_cast<const int*>(factor_->s);
+    view_.values = static_cast<const double*>(factor_->x);
+  }
+  Eigen::Index entries() const override { return static_cast<Eigen::Index>(factor_->xsize); }
+
+  RowMatrix<double> solve(const RowMatrix<double>& rhs) const override {
+    const Eigen::Index n = rhs.rows(), columns = rhs.cols();
+    const int width = panel_width(columns, omp_in_parallel() ? 1 : omp_get_max_threads());
+    const int panels = static_cast<int>((columns + width - 1) / width);
+    const int* const order = static_cast<const int*>(factor_->Perm);
+    RowMatrix<double> solution(n, columns);
+    std::vector<AlignedArray> buffers;  // allocated here: nothing may be thrown in the loop
+    for (int p = 0; p < std::min(panels, omp_get_max_threads()); ++p) {
+      buffers.push_back(aligned_array(static_cast<size_t>(n) * static_cast<size_t>(width)));
+    }
+#pragma omp parallel for schedule(static) \
+    num_threads(static_cast <int>(buffers.size())) if (panels > 1)
+    for (int p = 0; p < panels; ++p) {
+      double* const panel = buffers[static_cast<size_t>(omp_get_thread_num())].get();
+      const Eigen::Index first = static_cast<Eigen::Index>(p) * width;
+      const Eigen::Index count = std::min<Eigen::Index>(width, columns - first);
+      for (Eigen::Index i = 0; i < n; ++i) {
+        double* const to = panel + i * width;
+        const double* const from = rhs.data() + order[i] * columns + first;
+        std::copy(from, from + count, to);
+        std::fill(to + count, to + width, 0.0);
+      }
+      solve_panel(view_, panel, width);
+      for (Eigen::Index i = 0; i < n; ++i) {
+        const double* const from = panel + i * width;
+        std::copy(from, from + count, solution.data() + order[i] * columns + first);
+      }
+    }
+    return solution;
+  }
+
+ private:
+  FactorPointer factor_;
+  SupernodalFactor view_;
+};
+
+}  // namespace
+
+struct CholmodSymbolic::Impl {
+  FactorPointer analysis;
+  double work = 0.0;  // floating-point operations of a factorisation
+};
+
+CholmodSymbolic::CholmodSymbolic(const SparseMatrix& pattern, const Eigen::VectorXi& ordering)
+    : impl_(std::make_unique<Impl>()) {
+  Session session;
+  cholmod_sparse matrix = view(pattern);
+  if (ordering.size() > 0) {
+    session.common.nmethods = 1;
+    session.common.method[0].ordering = CHOLMOD_GIVEN;
+    Eigen::VectorXi given = ordering;  // CHOLMOD takes it writable
+    impl_->analysis.reset(cholmod_analyze_p(&matrix, given.data(), nullptr, 0, &session.common));
+  } else {
+    impl_->analysis.reset(cholmod_analyze(&matrix, &session.common));
+  }
+  check_memory(session);
+  if (impl_->analysis == nullptr) {
+    throw_not_definite(pattern.rows());
+  }
+  impl_->work = session.common.fl;
+}
+
+CholmodSymbolic::~CholmodSymbolic() = default;
+
+Eigen::VectorXi CholmodSymbolic::ordering() const {
+  return Eigen::Map<const Eigen::VectorXi>(static_cast<const int*>(impl_->analysis->Perm),
+                                           static_cast<Eigen::Index>(impl_->analysis->n));
+}
+
+std::unique_ptr<const Factor> CholmodSymbolic::factor(const SparseMatrix& matrix) const {
+  Session session;
+  FactorPointer factor(cholmod_copy_factor(impl_->analysis.get(), &session.common));
+  check_memory(session);
+  cholmod_sparse values = view(matrix);
+  const int threads = omp_get_max_threads();
+  if (impl_->work < kThreadedWork) {
+    omp_set_num_threads(1);  // this thread's own setting; OpenBLAS asks for it
+  }
+  cholmod_factorize(&values, factor.get(), &session.common);
+  omp_set_num_threads(threads);
+  check_memory(session);
+  if (session.common.status != CHOLMOD_OK || factor->minor != factor->n) {
+    throw_not_definite(matrix.rows());
+  }
+  return std::make_unique<const CholmodFactor>(std::move(factor));
+}
+
+}  // namespace supple
+
+#endif  // SUPPLE_WITH_CHOLMOD
