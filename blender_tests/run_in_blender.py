@@ -4,8 +4,8 @@
     blender -b --python-exit-code 1 -P blender_tests/run_in_blender.py -- [pytest arguments]
 
 Blender starts again with user folders of its own, so that the user's settings and cache are neither
-read nor changed. pytest is taken from SUPPLE_PYTEST_PATH, a site-packages folder for Blender's Python, or
-from .venv; it comes last on the path, so that NumPy stays Blender's.
+read nor changed. pytest is taken from SUPPLE_PYTEST_PATH, a site-packages folder for Blender's
+Python, or from .venv; it comes last on the path, so that NumPy stays Blender's.
 """
 
 import os

@@ -140,7 +140,8 @@ pip_install() {
 # --- Blender --------------------------------------------------------------------------------------
 
 # use_blender_home FOLDER: this shell's Blenders keep settings, add-ons and prepared meshes in FOLDER,
-# made empty, and leave the user's own alone. The first variable is for Blender 4.2 and later, the rest for 3.4.
+# made empty, and leave the user's own alone. The first variable is for Blender 4.2 and later, the
+# others of Blender's for 3.4.
 use_blender_home() {
   rm -rf "$1"
   mkdir -p "$1/config" "$1/scripts" "$1/datafiles"
