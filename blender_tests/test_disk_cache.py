@@ -4,6 +4,8 @@
 import json
 import os
 import subprocess
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import bodies
 import bpy
@@ -125,6 +127,19 @@ def test_preferences_switch_it_off_and_bound_it(addon, folder, preferences):
     files = list(folder.glob("*.supple"))
     assert len(files) > 1
     assert sum(path.stat().st_size for path in files) <= 1 << 20
+
+
+def test_preferences_show_folder_and_size(addon, folder):
+    addon("api").prepare(posed_bar())
+    layout = MagicMock()  # background Blender draws nothing
+    drawn = SimpleNamespace(layout=layout, disk_cache=True, cache_mebibytes=2048)
+    addon("preferences").SUPPLE_AP_preferences.draw(drawn, bpy.context)
+    texts = [call.kwargs["text"] for call in layout.label.mock_calls]
+    assert texts == [str(folder)]
+    row = layout.row.return_value
+    (text,) = [call.kwargs["text"] for call in row.label.mock_calls]
+    assert text.startswith("1 mesh, 0.")
+    row.operator.assert_called_once_with("supple.cache_clear", icon="TRASH")
 
 
 def test_clear_empties_the_folder(addon, folder):
