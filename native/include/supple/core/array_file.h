@@ -31,7 +31,7 @@ enum class ArrayType : uint32_t { float64 = 1, float32 = 2, int32 = 3 };
 /// A matrix or vector in memory by name: written to a file, or filled from one.
 struct NamedArray {
   /// name: at most 32 bytes. matrix: dense, row-major or a vector, of double, float or int; not
-  /// owned, must outlive this.
+  /// owned, must outlive this. What is written is its shape and memory of now.
   template <class Matrix>
   NamedArray(std::string name, Matrix& matrix);
 
