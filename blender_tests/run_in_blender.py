@@ -3,9 +3,9 @@
 
     blender -b --python-exit-code 1 -P blender_tests/run_in_blender.py -- [pytest arguments]
 
-Blender starts again with user folders of its own, so that the user's settings are neither read nor
-changed. pytest is taken from SUPPLE_PYTEST_PATH, a site-packages folder for Blender's Python, or
-from .venv; it comes last on the path, so that NumPy stays Blender's.
+Blender starts again with user folders of its own, so that the user's settings and cache are neither
+read nor changed. pytest is taken from SUPPLE_PYTEST_PATH, a site-packages folder for Blender's
+Python, or from .venv; it comes last on the path, so that NumPy stays Blender's.
 """
 
 import os
@@ -26,6 +26,7 @@ def start_again():
         "BLENDER_USER_CONFIG": f"{folder}/config",
         "BLENDER_USER_SCRIPTS": f"{folder}/scripts",
         "BLENDER_USER_DATAFILES": f"{folder}/datafiles",
+        "SUPPLE_CACHE_DIR": f"{folder}/prepared",
     }
     import bpy
 

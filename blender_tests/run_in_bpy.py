@@ -4,7 +4,7 @@
     VENV/bin/python blender_tests/run_in_bpy.py [pytest arguments]
 
 VENV holds bpy, pytest and the NumPy that this bpy wants. The extension is installed into a
-temporary folder, so that the user's settings are neither read nor changed.
+temporary folder, so that the user's settings and cache are neither read nor changed.
 """
 
 import os
@@ -18,6 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent
 def main():
     with tempfile.TemporaryDirectory(prefix="supple-bpy-") as folder:
         os.environ["BLENDER_USER_RESOURCES"] = folder  # read when bpy is imported
+        os.environ["SUPPLE_CACHE_DIR"] = f"{folder}/prepared"
         import bpy  # noqa: F401
         import pytest
 

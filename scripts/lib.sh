@@ -139,13 +139,15 @@ pip_install() {
 
 # --- Blender --------------------------------------------------------------------------------------
 
-# use_blender_home FOLDER: this shell's Blenders keep settings and add-ons in FOLDER, made empty, and
-# leave the user's own alone. The first variable is for Blender 4.2 and later, the rest for 3.4.
+# use_blender_home FOLDER: this shell's Blenders keep settings, add-ons and prepared meshes in FOLDER,
+# made empty, and leave the user's own alone. The first variable is for Blender 4.2 and later, the
+# others of Blender's for 3.4.
 use_blender_home() {
   rm -rf "$1"
   mkdir -p "$1/config" "$1/scripts" "$1/datafiles"
   export BLENDER_USER_RESOURCES=$1 BLENDER_USER_CONFIG=$1/config \
-    BLENDER_USER_SCRIPTS=$1/scripts BLENDER_USER_DATAFILES=$1/datafiles
+    BLENDER_USER_SCRIPTS=$1/scripts BLENDER_USER_DATAFILES=$1/datafiles \
+    SUPPLE_CACHE_DIR=$1/prepared
 }
 
 # debian_blender ARGUMENT...: Debian's Blender with Debian's Python. It takes the modules of the first

@@ -18,7 +18,7 @@ TORCH=2.13.0       # the reference in tests, never what users install
 setup_build() {
   section "Set-up: build tools and libraries"
   apt_install g++ libopenblas-openmp-dev libsuitesparse-dev libeigen3-dev libspectra-dev \
-    libnanoflann-dev libgtest-dev libbenchmark-dev
+    libnanoflann-dev libxxhash-dev libgtest-dev libbenchmark-dev
 
   if ! python_is_311 "$VENV/bin/python"; then
     local python

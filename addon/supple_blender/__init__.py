@@ -18,9 +18,16 @@ bl_info = {
 # Kept apart from bl_info, which Blender replaces when the add-on is an extension.
 VERSION = bl_info["version"]
 
-from . import compat, handle_operators, panel, pose_operators, properties  # noqa: E402
+from . import (  # noqa: E402
+    compat,
+    handle_operators,
+    panel,
+    pose_operators,
+    preferences,
+    properties,
+)
 
-_MODULES = (properties, pose_operators, handle_operators, panel)
+_MODULES = (preferences, properties, pose_operators, handle_operators, panel)
 _cli_commands = []
 
 

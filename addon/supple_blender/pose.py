@@ -87,7 +87,7 @@ def _solve(pose_input, stages):
     return Pose(
         positions=space.to_local_points(rest.stretch, np.asarray(result.vertices)),
         notes=[note.message for note in result.notes],
-        report=dict(result.report),
+        report={**result.report, "from_cache": mesh.from_cache},
     )
 
 

@@ -49,6 +49,8 @@ class SUPPLE_OT_prepare(LongOperator, bpy.types.Operator):
         notes = [note.message for note in mesh.notes]
         status.remember(inputs, mesh.seconds, notes)
         text = f"{inputs.name}: {len(inputs.positions):,} vertices ready in {seconds:.1f} s"
+        if mesh.from_cache:
+            text += ", from the disk cache"
         return "INFO", ". ".join([text, *notes])
 
 

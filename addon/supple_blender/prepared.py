@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What was computed once for a mesh and its handles, kept in memory.
+"""What was computed once for a mesh and its handles, kept in memory; meshes also on disk.
 
 Entries are found by their content (geometry and handle vertices), so that a changed mesh, an undo,
 a renamed object or another file can never meet a stale one.
@@ -41,10 +41,28 @@ class _Cache:
 
 _meshes = _Cache()
 _editors = _Cache()
+# As the preferences say; here, because the thread that computes may not ask Blender.
+_disk = {"use": True, "mebibytes": None}
+
+
+def use_disk(use, mebibytes):
+    """Keep prepared meshes on disk from now on, or do not; mebibytes: the most they may take."""
+    _disk.update(use=use, mebibytes=mebibytes)
+
+
+def _disk_cache():
+    """Return what `supple.PreparedMesh` takes as its cache."""
+    supple = native.supple()
+    if not _disk["use"]:
+        return False
+    try:
+        return supple.cache.default(_disk["mebibytes"])
+    except supple.SuppleError:
+        return True  # it finds the same and says so in a note, and the work goes on
 
 
 def clear():
-    """Forget everything."""
+    """Forget everything that is in memory."""
     _meshes.clear()
     _editors.clear()
 
@@ -60,7 +78,10 @@ def mesh(rest, stages, share=1.0):
     if found is None:
         progress = stages.begin("Preparing", share)
         found = native.supple().PreparedMesh(
-            space.to_solve_points(rest.stretch, rest.positions), rest.triangles, progress=progress
+            space.to_solve_points(rest.stretch, rest.positions),
+            rest.triangles,
+            progress=progress,
+            cache=_disk_cache(),
         )
         _meshes.put(rest.digest, found)
     return found

@@ -40,6 +40,7 @@ def main():
             "BLENDER_USER_CONFIG": f"{user}/config",
             "BLENDER_USER_SCRIPTS": f"{user}/scripts",
             "BLENDER_USER_DATAFILES": f"{user}/datafiles",
+            "SUPPLE_CACHE_DIR": f"{user}/prepared",
         }
         command = [
             *(programs[0], "--auto-servernum", "-s", "-screen 0 1280x800x24", programs[1]),

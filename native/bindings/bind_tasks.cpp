@@ -27,15 +27,17 @@ EditOptions edit_options(const std::string& mode, int rounds, int network_rounds
 void bind_tasks(py::module_& module) {
   py::class_<PreparedMesh, std::shared_ptr<PreparedMesh>>(module, "PreparedMesh")
       .def(py::init([](const Points& vertices, const Faces& faces, int eigenfunctions, int samples,
-                       Progress* progress) {
+                       Progress* progress, const PreparedCache* cache) {
              return std::make_shared<PreparedMesh>(
-                 vertices, faces, PrepareOptions{eigenfunctions, samples}, range(progress));
+                 vertices, faces, PrepareOptions{eigenfunctions, samples}, range(progress), cache);
            }),
            py::arg("vertices"), py::arg("faces"), py::arg("eigenfunctions") = 128,
-           py::arg("samples") = 1024, py::arg("progress") = nullptr, NoGil())
+           py::arg("samples") = 1024, py::arg("progress") = nullptr, py::arg("cache") = nullptr,
+           NoGil())
       .def_property_readonly("vertices", [](const PreparedMesh& p) { return p.mesh.vertices(); })
       .def_property_readonly("faces", [](const PreparedMesh& p) { return p.mesh.faces(); })
-      .def_property_readonly("notes", [](const PreparedMesh& p) { return p.mesh.notes(); })
+      .def_property_readonly("notes", [](const PreparedMesh& p) { return p.notes; })
+      .def_readonly("from_cache", &PreparedMesh::from_cache)
       .def_property_readonly("diagonal", [](const PreparedMesh& p) { return p.mesh.diagonal(); })
       .def_property_readonly("eigenvalues", [](const PreparedMesh& p) { return p.basis.values; })
       .def_property_readonly("residual", [](const PreparedMesh& p) { return p.basis.residual; });

@@ -7,5 +7,6 @@ PYBIND11_MODULE(_native, module) {
   supple::bindings::bind_core(module);
   supple::bindings::bind_geometry(module);
   supple::bindings::bind_learning(module);
+  supple::bindings::bind_cache(module);
   supple::bindings::bind_tasks(module);
 }

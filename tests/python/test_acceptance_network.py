@@ -34,7 +34,7 @@ def pairs() -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
 
 @pytest.fixture(scope="module")
 def prepared(pairs) -> list[supple.PreparedMesh]:
-    return [supple.PreparedMesh(source, faces) for source, faces, _ in pairs]
+    return [supple.PreparedMesh(source, faces, cache=False) for source, faces, _ in pairs]
 
 
 def farthest_points(points: np.ndarray, count: int) -> list[int]:

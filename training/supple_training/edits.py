@@ -54,7 +54,7 @@ def true_handles(pair: Pair, centres: NDArray[np.int64]) -> list[supple.Handle]:
 def suggestions(pair: Pair, rng: np.random.Generator, count: int) -> list[Suggestion]:
     """`count` edits of a pair by random handles, each stopped after a random number of rounds."""
     source, faces, _ = pair
-    prepared = supple.PreparedMesh(source, faces, eigenfunctions=1, samples=1)
+    prepared = supple.PreparedMesh(source, faces, eigenfunctions=1, samples=1, cache=False)
     result = []
     for _ in range(count):
         handle_count = int(np.exp(rng.uniform(*np.log(HANDLES))))

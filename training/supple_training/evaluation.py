@@ -34,7 +34,7 @@ def rotation_rows(pairs: list[Pair], model: supple.Model) -> list[Rows]:
     result = []
     for pair in pairs:
         source, faces, target = pair
-        prepared = supple.PreparedMesh(source, faces)
+        prepared = supple.PreparedMesh(source, faces, cache=False)
         rows: Rows = {"network": {}, "no_network": {}}
         for count in HANDLE_COUNTS:
             editor = supple.Editor(
@@ -51,7 +51,7 @@ def spectral_rows(pairs: list[Pair], model: supple.Model) -> list[Rows]:
     """For each pair: the target recovered from its coordinates in 40 and 80 eigenfunctions."""
     result = []
     for source, faces, target in pairs:
-        prepared = supple.PreparedMesh(source, faces)
+        prepared = supple.PreparedMesh(source, faces, cache=False)
         rows: Rows = {"network": {}, "no_network": {}}
         for count in EIGENFUNCTIONS:
             for name, row in rows.items():

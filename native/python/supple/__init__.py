@@ -13,7 +13,8 @@ import os
 # more than waking them (measured 17 times on 2 cores). Read when the native module loads.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
-from ._native import Progress, __version__
+from . import cache
+from ._native import PreparedCache, Progress, __version__
 from .deforming import deform
 from .editing import Editor, EditResult, Handle, edit
 from .errors import Cancelled, SuppleError
@@ -30,11 +31,13 @@ __all__ = [
     "Mesh",
     "Model",
     "Note",
+    "PreparedCache",
     "PreparedMesh",
     "Progress",
     "SuppleError",
     "TrainResult",
     "__version__",
+    "cache",
     "deform",
     "edit",
     "face_distortion",

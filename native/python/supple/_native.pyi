@@ -6,6 +6,8 @@ Native core of Supple; use the package `supple`, which checks and documents.
 from __future__ import annotations
 
 import collections.abc
+import os
+import pathlib
 import typing
 
 import numpy
@@ -178,6 +180,36 @@ class TrainingPair:
         target: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
     ) -> None: ...
 
+class PreparedCache:
+    """
+    A folder that keeps prepared meshes, for any number of threads and processes.
+
+    supple.cache makes the one that is used where none is named.
+    """
+    def __init__(
+        self,
+        folder: os.PathLike | str | bytes,
+        max_bytes: typing.SupportsInt | typing.SupportsIndex,
+    ) -> None: ...
+    def clear(self) -> tuple[int, int]:
+        """
+        Remove all files; return their number and bytes.
+        """
+    def size(self) -> tuple[int, int]:
+        """
+        Number of files and their bytes.
+        """
+    @property
+    def folder(self) -> pathlib.Path:
+        """
+        Where the files are.
+        """
+    @property
+    def max_bytes(self) -> int:
+        """
+        The most the files may take together.
+        """
+
 class PreparedMesh:
     def __init__(
         self,
@@ -186,6 +218,7 @@ class PreparedMesh:
         eigenfunctions: typing.SupportsInt | typing.SupportsIndex = 128,
         samples: typing.SupportsInt | typing.SupportsIndex = 1024,
         progress: Progress = None,
+        cache: PreparedCache = None,
     ) -> None: ...
     @property
     def diagonal(self) -> float: ...
@@ -193,6 +226,8 @@ class PreparedMesh:
     def eigenvalues(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
     def faces(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]"]: ...
+    @property
+    def from_cache(self) -> bool: ...
     @property
     def notes(self) -> list[Note]: ...
     @property

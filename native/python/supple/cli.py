@@ -60,6 +60,7 @@ def edit(
     mode: Annotated[Mode, typer.Option(help="How an edit ends.")] = Mode.natural,
     network: Annotated[bool, typer.Option(help="Use the network, or the identity.")] = True,
     model: Annotated[str, typer.Option(help="Shipped network or .safetensors file.")] = "rotation",
+    cache: Annotated[bool, typer.Option(help="Keep prepared meshes on disk, and use them.")] = True,
 ) -> None:
     """Pose meshes by their handles and measure the result.
 
@@ -80,7 +81,7 @@ def edit(
                 raise supple.SuppleError(
                     "bad_case", f"Two cases are called '{case.name}'; rename one folder."
                 )
-            vertices, figures[case.name] = _edit_case(case, chosen, mode)
+            vertices, figures[case.name] = _edit_case(case, chosen, mode, cache)
             write_mesh(out / f"{case.name}.obj", vertices, case.faces)
         except (supple.SuppleError, OSError) as error:
             errors[str(folder)] = str(error)
@@ -100,11 +101,36 @@ def edit(
         raise typer.Exit(1)
 
 
+@app.command("cache")
+def show_cache(
+    clear: Annotated[bool, typer.Option("--clear", help="Remove all of it.")] = False,
+) -> None:
+    """Show where prepared meshes are kept on disk and what they take, or remove them."""
+    try:
+        removed = supple.cache.clear() if clear else None
+        kept, cap, enabled = supple.cache.size(), supple.cache.max_bytes(), supple.cache.enabled()
+    except supple.SuppleError as error:
+        _console.print(f"[red]error[/red] {error}")
+        raise typer.Exit(1) from error
+    lines = {
+        "folder": str(supple.cache.folder()),
+        "in use": "yes" if enabled else "no (SUPPLE_CACHE=0)",
+        "meshes": str(kept.files),
+        "size": f"{kept.bytes / supple.cache.MEBIBYTE:.1f} MiB",
+        "cap": f"{cap / supple.cache.MEBIBYTE:.1f} MiB",
+    }
+    if removed is not None:
+        lines["removed"] = f"{removed.files} ({removed.bytes / supple.cache.MEBIBYTE:.1f} MiB)"
+    # Plain lines: a folder's name must not be broken to the width of a window.
+    for name, value in lines.items():
+        typer.echo(f"{name:<8} {value}")
+
+
 def _edit_case(
-    case: EditCase, model: supple.Model | None, mode: Mode
+    case: EditCase, model: supple.Model | None, mode: Mode, cache: bool
 ) -> tuple[np.ndarray, dict[str, object]]:
     def prepare(progress: supple.Progress) -> supple.PreparedMesh:
-        return supple.PreparedMesh(case.vertices, case.faces, progress=progress)
+        return supple.PreparedMesh(case.vertices, case.faces, progress=progress, cache=cache)
 
     prepared = _watched(f"{case.name}: preparing", prepare)
     editor = supple.Editor(prepared, case.handles, model=model)
@@ -126,6 +152,7 @@ def _edit_case(
         "handle_error": error / prepared.diagonal,
         "pose_error": pose_error,
         "prepare_seconds": prepared.seconds,
+        "from_cache": prepared.from_cache,
         "frame_milliseconds": times[_MEASURED_SOLVES // 2],
         "vertices": prepared.vertex_count,
         "stages": result.report,

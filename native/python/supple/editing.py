@@ -175,7 +175,8 @@ def edit(
     mode: str = "natural",
     network: bool = True,
     progress: _native.Progress | None = None,
+    cache: bool | _native.PreparedCache | None = True,
 ) -> EditResult:
     """Prepare, bind and solve in one call; see PreparedMesh, Editor and Editor.solve."""
-    prepared = PreparedMesh(vertices, faces, progress=progress)
+    prepared = PreparedMesh(vertices, faces, progress=progress, cache=cache)
     return Editor(prepared, handles, model=model).solve(mode=mode, network=network)

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native, arrays
+from . import cache as disk_cache
+from .errors import SuppleError
 
 
 @dataclass(frozen=True)
@@ -16,7 +18,8 @@ class Note:
 
     Attributes:
         code: "degenerate_faces", "unattached_vertices", "boundary", "nonmanifold_edges",
-            "components".
+            "components"; of a prepared mesh also "cache_rebuilt", "cache_unwritable",
+            "cache_too_small".
         count: how many places.
         message: for people.
     """
@@ -28,6 +31,14 @@ class Note:
 
 def _notes(native: object) -> list[Note]:
     return [Note(note.code, note.count, note.message) for note in native.notes]
+
+
+def _default_cache() -> tuple[_native.PreparedCache | None, list[Note]]:
+    """The user's cache. Where its settings are wrong the work goes on without one, and says so."""
+    try:
+        return disk_cache.default(), []
+    except SuppleError as error:
+        return None, [Note("cache_unwritable", 1, f"The disk cache is not used. {error}")]
 
 
 class Mesh:
@@ -59,10 +70,14 @@ class PreparedMesh:
         eigenfunctions: of the network's spectral projections; fewer where the mesh has fewer.
         samples: points the network is evaluated at; 0 for every vertex (slower).
         progress: a Progress to watch and cancel.
+        cache: where the result is looked for and kept: True for the user's cache (see
+            supple.cache), False or None for nowhere, or a PreparedCache. A cache that fails is
+            never an error, but a note.
 
     Attributes:
         vertices, faces: as given, float64 and int32.
         notes: list of Note.
+        from_cache: whether it was found there instead of computed; the same bit for bit.
         seconds: time it took to prepare.
         residual: largest relative residual of the eigenfunctions.
 
@@ -79,14 +94,19 @@ class PreparedMesh:
         eigenfunctions: int = 128,
         samples: int = 1024,
         progress: _native.Progress | None = None,
+        cache: bool | _native.PreparedCache | None = True,
     ) -> None:
         start = time.perf_counter()
         self.vertices: NDArray[np.float64] = arrays.points(vertices)
         self.faces: NDArray[np.int32] = arrays.triangles(faces)
+        problems = []
+        if cache is True:
+            cache, problems = _default_cache()
         self.native = _native.PreparedMesh(
-            self.vertices, self.faces, eigenfunctions, samples, progress
+            self.vertices, self.faces, eigenfunctions, samples, progress, cache or None
         )
-        self.notes = _notes(self.native)
+        self.from_cache: bool = self.native.from_cache
+        self.notes = _notes(self.native) + problems
         self.residual: float = self.native.residual
         self.seconds = time.perf_counter() - start
 

@@ -25,6 +25,8 @@ const char* to_string(ErrorCode code) {
       return "stale_mesh";
     case ErrorCode::model_file:
       return "model_file";
+    case ErrorCode::array_file:
+      return "array_file";
     case ErrorCode::bad_option:
       return "bad_option";
     case ErrorCode::not_positive_definite:

@@ -177,11 +177,32 @@ LayerSizes Architecture::sizes() const {
 template <class Scalar>
 NetworkContext<Scalar>::NetworkContext(const SurfaceOperators& surface, const Eigenbasis& basis,
                                        int eigenfunctions, Eigen::Index sample_count)
-    : operators(&surface) {
-  const Eigen::Index n = surface.vertices.rows();
+    : operators(&surface),
+      samples(farthest_point_samples(surface.vertices,
+                                     sample_count > 0 ? sample_count : surface.vertices.rows())),
+      domain(sampled_domain<Scalar>(basis, basis.stable_count(eigenfunctions), surface.vertices,
+                                    samples)) {
+  complete(basis);
+}
+
+template <class Scalar>
+NetworkContext<Scalar>::NetworkContext(const SurfaceOperators& surface, const Eigenbasis& basis,
+                                       int eigenfunctions, Eigen::VectorXi samples_in,
+                                       RowMatrix<Scalar> projector)
+    : operators(&surface), samples(std::move(samples_in)) {
   const Eigen::Index k = basis.stable_count(eigenfunctions);
-  samples = farthest_point_samples(surface.vertices, sample_count > 0 ? sample_count : n);
-  domain = sampled_domain<Scalar>(basis, k, surface.vertices, samples);
+  domain.functions.resize(samples.size(), k);
+  for (Eigen::Index p = 0; p < samples.size(); ++p) {
+    domain.functions.row(p) = basis.functions.row(samples[p]).head(k).template cast<Scalar>();
+  }
+  domain.projector = std::move(projector);
+  complete(basis);
+}
+
+template <class Scalar>
+void NetworkContext<Scalar>::complete(const Eigenbasis& basis) {
+  const SurfaceOperators& surface = *operators;
+  const Eigen::Index k = domain.functions.cols();
   functions = basis.functions.leftCols(k).template cast<Scalar>();
   weighted_functions =
       (basis.functions.leftCols(k).transpose() * basis.mass.asDiagonal()).template cast<Scalar>();

@@ -18,6 +18,7 @@ enum class ErrorCode {
   singular_matrix,        ///< a handle matrix without an inverse
   stale_mesh,             ///< the mesh is not the one that was prepared
   model_file,             ///< weights that are truncated, foreign or of another architecture
+  array_file,             ///< arrays on disk that are damaged, foreign, or can't be read or written
   bad_option,             ///< a setting outside its range
   not_positive_definite,  ///< a factorisation met a matrix it cannot factor
   no_convergence,         ///< an iteration did not reach its stated residual

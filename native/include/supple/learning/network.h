@@ -60,19 +60,26 @@ struct Architecture {
 /// What a network needs to know of a rest mesh besides its operators: built once a mesh.
 template <class Scalar>
 struct NetworkContext {
+  NetworkContext() = default;  ///< of no mesh
   /// samples: number of points the layers are evaluated at; 0 for every vertex (the paper).
   /// eigenfunctions: at most the basis's; fewer are used where the mesh has fewer, or where the
   /// limit would cut through a multiple eigenvalue.
   NetworkContext(const SurfaceOperators& operators, const Eigenbasis& basis, int eigenfunctions,
                  Eigen::Index samples);
+  /// The same from its `samples` and `domain.projector`, which take longest to find.
+  NetworkContext(const SurfaceOperators& operators, const Eigenbasis& basis, int eigenfunctions,
+                 Eigen::VectorXi samples, RowMatrix<Scalar> projector);
 
-  const SurfaceOperators* operators;     ///< not owned; must outlive this
-  Eigen::VectorXi samples;               ///< p vertex indices
-  SpectralDomain<Scalar> domain;         ///< the eigenfunctions at the samples
-  RowMatrix<Scalar> functions;           ///< n x k at every vertex
-  RowMatrix<Scalar> weighted_functions;  ///< k x n, Phi^T M
-  std::vector<Eigen::Index> scales;      ///< ascending counts of eigenfunctions, the last is k
-  RowMatrix<Scalar> shape;               ///< p x 2 scales: distance to the smoothed surface
+  const SurfaceOperators* operators = nullptr;  ///< not owned; must outlive this
+  Eigen::VectorXi samples;                      ///< p vertex indices
+  SpectralDomain<Scalar> domain;                ///< the eigenfunctions at the samples
+  RowMatrix<Scalar> functions;                  ///< n x k at every vertex
+  RowMatrix<Scalar> weighted_functions;         ///< k x n, Phi^T M
+  std::vector<Eigen::Index> scales;  ///< ascending counts of eigenfunctions, the last is k
+  RowMatrix<Scalar> shape;           ///< p x 2 scales: distance to the smoothed surface
+
+ private:
+  void complete(const Eigenbasis& basis);  // all that follows from samples and domain
 };
 
 /// A network and its weights. Scalar is float in use, double where derivatives are checked.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "supple/core/progress.h"
@@ -9,6 +10,7 @@
 #include "supple/geometry/surface_operators.h"
 #include "supple/learning/network.h"
 #include "supple/spectral/eigenbasis.h"
+#include "supple/tasks/prepared_cache.h"
 
 namespace supple {
 
@@ -21,17 +23,28 @@ struct PrepareOptions {
 /// Everything about a rest mesh that no handle, target or network changes. Built once, then shared
 /// by any number of editors; immutable.
 struct PreparedMesh {
-  /// Errors: those of `TriangleMesh` and `eigenbasis`; `bad_option`; `cancelled`.
+  /// cache: where what takes long is looked for, and kept once computed; nullptr for nowhere. What
+  /// comes from it is what was computed, bit for bit. Not needed after this returns.
+  /// Errors: those of `TriangleMesh` and `eigenbasis`; `bad_option`; `cancelled`. A cache that
+  /// fails is no error: `notes` says so.
   PreparedMesh(const Points& vertices, const Faces& faces, const PrepareOptions& options = {},
-               ProgressRange progress = {});
+               ProgressRange progress = {}, const PreparedCache* cache = nullptr);
 
   TriangleMesh mesh;
   SurfaceOperators operators;
   Eigenbasis basis;
   NetworkContext<float> sampled;
+  bool from_cache = false;
+  /// Those of the mesh, then the cache's: `cache_rebuilt`, `cache_unwritable`, `cache_too_small`.
+  std::vector<Note> notes;
   /// The context a network is evaluated with: `paper` needs every vertex and is built when first
   /// asked.
   std::shared_ptr<const NetworkContext<float>> context_for(const Architecture& architecture) const;
+
+ private:
+  void compute(const PrepareOptions& options, const ProgressRange& progress);
+  bool load(const PrepareOptions& options, const PreparedCache& cache, const std::string& key);
+  void store(const PreparedCache& cache, const std::string& key);
 };
 
 }  // namespace supple
