@@ -118,6 +118,7 @@ class Worker:
     def answer(self, limit: float) -> dict:
         """The next answer. Errors: OverLimit, Failed; the process is gone then."""
         if not select.select([self._process.stdout], [], [], limit)[0]:
+            self._process.kill()
             self.close()
             raise OverLimit(f"more than {limit:g} s")
         line = b""
@@ -144,15 +145,14 @@ class Worker:
         return lines[-1] if lines else f"ended with code {code}"
 
     def close(self) -> None:
-        """End the process, at once if need be."""
-        if self._process.poll() is None:
-            try:
-                with contextlib.suppress(BrokenPipeError):
-                    self._process.stdin.write(b"quit\n")
-                self._process.wait(2)
-            except subprocess.TimeoutExpired:
-                self._process.kill()
-                self._process.wait()
+        """End the process, by force where it does not end itself."""
+        try:
+            with contextlib.suppress(OSError, ValueError):  # it ended, or this was closed before
+                self._process.stdin.write(b"quit\n")
+            self._process.wait(2)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
         for stream in (self._process.stdin, self._process.stdout, self._errors):
             stream.close()
 
