@@ -24,7 +24,8 @@ def _run(what: str, *command: object, folder: Path) -> None:
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        env={**os.environ, "PATH": path, "PYTHONPATH": ""},
+        # Older commits' scripts/package.py does not name the right Spectra itself.
+        env={"spectra_ROOT": "/usr", **os.environ, "PATH": path, "PYTHONPATH": ""},
     )
     if done.returncode:
         lines = "\n".join(done.stdout.splitlines()[-15:])

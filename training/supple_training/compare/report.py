@@ -210,7 +210,9 @@ def plot(made: dict, path: Path) -> None:
                 for r in mine
                 if r["contender"] == contender and (not threads or r["threads"] == threads)
             )
-            label = f"{contender}, {threads} threads" if threads else contender
+            label = contender
+            if threads:
+                label += f", {threads} thread" + ("s" if threads > 1 else "")
             style = {
                 "marker": "o",
                 "ms": 3,
@@ -234,7 +236,7 @@ def plot(made: dict, path: Path) -> None:
             axes.set(xlabel="vertices", xscale="log", yscale="log")
             axes.grid(alpha=0.3)
         if lines:
-            left.legend(fontsize=7)
+            left.legend(fontsize=7, loc="upper left")
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
