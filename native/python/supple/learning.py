@@ -139,7 +139,7 @@ def network_forward(
 def network_gradient(
     prepared: PreparedMesh, model: Model, rotations: ArrayLike, grad: ArrayLike
 ) -> dict[str, NDArray[np.float32]]:
-    """The gradient with respect to every weight by name, from the one with respect to the Jacobians.
+    """The gradient with respect to every weight, by name, from the one with respect to Jacobians.
 
     Evaluates the network first; arguments and errors are those of network_forward.
 

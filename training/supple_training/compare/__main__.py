@@ -122,7 +122,7 @@ def speed(
     ] = "2",
     out: Annotated[
         Path, typer.Option(help="Folder for speed.json, speed.md and speed.png.")
-    ] = Path("speed"),
+    ] = Path("out/speed"),
     peers: Annotated[
         bool | None,
         typer.Option(
