@@ -5,13 +5,24 @@ how long anything takes."""
 import copy
 import importlib.util
 import json
+import subprocess
 import sys
 
 import numpy as np
 import pytest
 import supple
 import supple.geometry
-from supple_training.compare import contender, difference, kernels, report, runner, shapes, tasks
+from supple_training.compare import (
+    against,
+    contender,
+    difference,
+    kernels,
+    machine,
+    report,
+    runner,
+    shapes,
+    tasks,
+)
 from supple_training.compare.__main__ import app
 from typer.testing import CliRunner
 
@@ -372,3 +383,69 @@ def test_pytorch_step_has_the_loss_of_ours():
     signal = torch.from_numpy(networks.rotations(case).astype(np.float32))
     step = torch_paper.TrainingStep(surface, network, signal, pair[2])
     assert step.loss().item() == pytest.approx(ours.steps[0]["loss"], rel=1e-3)
+
+
+# --- another commit -------------------------------------------------------------------------------
+
+# Makes a wheel whose package says what the file VALUE says.
+PACKAGE = """
+import pathlib, sys, zipfile
+value = pathlib.Path("VALUE").read_text()
+if value == "broken":
+    sys.exit("this cannot be built")
+tag = f"cp{sys.version_info.major}{sys.version_info.minor}-none-any"
+pathlib.Path("dist").mkdir(exist_ok=True)
+with zipfile.ZipFile(f"dist/supple-1.0-{tag}.whl", "w") as wheel:
+    info = "supple-1.0.dist-info/"
+    wheel.writestr("supple/__init__.py", value)
+    wheel.writestr(info + "METADATA", "Metadata-Version: 2.1\\nName: supple\\nVersion: 1.0\\n")
+    wheel.writestr(info + "WHEEL", f"Wheel-Version: 1.0\\nRoot-Is-Purelib: true\\nTag: {tag}\\n")
+    wheel.writestr(info + "RECORD", "")
+"""
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """A git repository of two commits, with a change since."""
+    folder = tmp_path / "checkout"
+    (folder / "scripts").mkdir(parents=True)
+    (folder / "scripts" / "package.py").write_text(PACKAGE)
+    (folder / ".gitignore").write_text("dist\n")
+
+    def git(*arguments: str) -> None:
+        who = ("-c", "user.name=A", "-c", "user.email=a@example.org")
+        subprocess.run(["git", "-C", folder, *who, *arguments], check=True, capture_output=True)
+
+    git("init", "-q", "-b", "main")
+    for value in ("broken", "committed"):
+        (folder / "VALUE").write_text(value)
+        git("add", "-A")
+        git("commit", "-q", "-m", value)
+    (folder / "VALUE").write_text("changed")
+    return folder
+
+
+def worktrees(folder) -> int:
+    listed = subprocess.run(["git", "-C", folder, "worktree", "list"], capture_output=True)
+    return len(listed.stdout.splitlines())
+
+
+def test_a_commit_and_the_checkout_are_built_side_by_side(checkout):
+    commit = machine.commit(checkout, "main")
+    assert machine.commit(checkout) == f"{commit}+changes"
+    assert machine.commit(checkout, "nothing") is None
+    with against.both(checkout, commit) as (base, new):
+        assert (base / "supple" / "__init__.py").read_text() == "committed"
+        assert (new / "supple" / "__init__.py").read_text() == "changed"
+    assert not base.exists()
+    assert worktrees(checkout) == 1
+
+
+def test_a_build_that_fails_says_why_and_leaves_nothing(checkout):
+    broken = machine.commit(checkout, "main~1")
+    with (
+        pytest.raises(against.BuildError, match="this cannot be built"),
+        against.both(checkout, broken),
+    ):
+        pass
+    assert worktrees(checkout) == 1
