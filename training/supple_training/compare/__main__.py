@@ -58,12 +58,21 @@ def _show_difference(base: dict, new: dict, floor: float) -> int:
     """Print it; returns the exit code."""
     found = difference.changes(base, new, floor)
     console.print(difference.table(found))
+    compared = [change for change in found if change.ratio is not None]
+    for change in found:
+        if change.ratio is None:
+            task, contender, size, threads = change.key
+            console.print(
+                f"  {task}, {contender}, {size} vertices, threads {threads}: {change.verdict}",
+                markup=False,
+                highlight=False,
+            )
     for warning in difference.warnings(base, new):
         console.print(f"[yellow]{warning}[/]")
     slower = [change for change in found if change.verdict == "slower"]
     faster = [change for change in found if change.verdict == "faster"]
     console.print(
-        f"{len(found)} measurements: {len(slower)} slower beyond noise, {len(faster)} faster"
+        f"{len(compared)} compared: {len(slower)} slower beyond noise, {len(faster)} faster"
     )
     return 1 if slower else 0
 

@@ -109,21 +109,18 @@ def warnings(base: dict, new: dict) -> list[str]:
 
 
 def table(found: list[Change]) -> Table:
-    """For people."""
+    """For people: what both have."""
     result = Table(title="New against base (below 1: new is faster)")
     for name in ("task", "", "vertices", "threads", "base", "new", "ratio", "noise", "peak memory"):
         result.add_column(name, justify="left" if name in ("task", "") else "right")
     result.add_column("")
     colours = {"slower": "red", "faster": "green"}
-    for change in found:
+    for change in (each for each in found if each.ratio is not None):
         task, contender, size, threads = change.key
         row = [task, contender, size, str(threads)]
-        if change.ratio is None:
-            row += [""] * 5
-        else:
-            row += [seconds_text(seconds) for seconds in change.medians]
-            row += [f"{change.ratio:.2f}", f"{change.low:.2f} to {change.high:.2f}"]
-            row.append(" -> ".join(bytes_text(peak) for peak in change.peaks))
+        row += [seconds_text(seconds) for seconds in change.medians]
+        row += [f"{change.ratio:.2f}", f"{change.low:.2f} to {change.high:.2f}"]
+        row.append(" -> ".join(bytes_text(peak) for peak in change.peaks))
         colour = colours.get(change.verdict)
         row.append(f"[{colour}]{change.verdict}[/]" if colour else change.verdict)
         result.add_row(*row)
