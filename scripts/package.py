@@ -163,6 +163,9 @@ def build_wheel(target: Target, version: str) -> Path:
     tools = Path(target.python).parent
     path = f"{tools}{os.pathsep}{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     env = {
+        # libigl's wheel, which training/ installs, carries a CMake file for Spectra that would be
+        # found first and cannot be used.
+        "spectra_ROOT": "/usr",
         **os.environ,
         "PATH": path,
         "CMAKE_BUILD_PARALLEL_LEVEL": str(os.cpu_count() or 1),

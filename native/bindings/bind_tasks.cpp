@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings.h"
+#include "supple/core/error.h"
 #include "supple/tasks/deform.h"
 #include "supple/tasks/edit.h"
 #include "supple/tasks/metrics.h"
@@ -20,6 +21,50 @@ EditOptions edit_options(const std::string& mode, int rounds, int network_rounds
   options.network = network;
   options.loose_pieces = loose_pieces_follow ? LoosePieces::follow : LoosePieces::stay;
   return options;
+}
+
+// The rotations of a `rotation` signal as they are: m x 9, one matrix a face.
+Signal signal_of(const PreparedMesh& prepared, const Network& network,
+                 const MatrixField& rotations) {
+  if (network.architecture().signal != SignalKind::rotation) {
+    throw Error(ErrorCode::bad_option, "This network takes the spectral signal, not rotations.");
+  }
+  if (rotations.rows() != prepared.operators.faces.rows()) {
+    throw Error(ErrorCode::wrong_shape,
+                "There are " + std::to_string(rotations.rows()) + " rotations for a mesh of " +
+                    std::to_string(prepared.operators.faces.rows()) + " faces.");
+  }
+  return Signal{{rotations}};
+}
+
+MatrixField network_forward(const PreparedMesh& prepared, const Network& network,
+                            const MatrixField& rotations) {
+  return network.forward(*prepared.context_for(network.architecture()),
+                         signal_of(prepared, network, rotations));
+}
+
+std::map<std::string, RowMatrix<float>> network_gradient(const PreparedMesh& prepared,
+                                                         const Network& network,
+                                                         const MatrixField& rotations,
+                                                         const MatrixField& grad) {
+  const Signal signal = signal_of(prepared, network, rotations);
+  if (grad.rows() != rotations.rows()) {
+    throw Error(ErrorCode::wrong_shape, "There are " + std::to_string(grad.rows()) +
+                                            " gradients for " + std::to_string(rotations.rows()) +
+                                            " faces.");
+  }
+  const auto context = prepared.context_for(network.architecture());
+  Network::Trace trace;
+  network.forward(*context, signal, &trace);
+  auto gradient = LayerParameters<float>::zeros(network.architecture().sizes());
+  network.backward(*context, signal, trace, grad, gradient);
+  std::map<std::string, RowMatrix<float>> result;
+  for (size_t layer = 0; layer < gradient.weights.size(); ++layer) {
+    const std::string name = "layer." + std::to_string(layer);
+    result[name + ".weight"] = std::move(gradient.weights[layer]);
+    result[name + ".bias"] = gradient.biases[layer];
+  }
+  return result;
 }
 
 }  // namespace
@@ -95,6 +140,11 @@ void bind_tasks(py::module_& module) {
       },
       py::arg("prepared"), py::arg("target"), py::arg("eigenfunctions"), py::arg("network"),
       py::arg("progress") = nullptr, NoGil());
+
+  module.def("network_forward", &network_forward, py::arg("prepared"), py::arg("network"),
+             py::arg("rotations"), NoGil());
+  module.def("network_gradient", &network_gradient, py::arg("prepared"), py::arg("network"),
+             py::arg("rotations"), py::arg("grad"), NoGil());
 
   module.def("face_distortion", &face_distortion, py::arg("rest"), py::arg("faces"),
              py::arg("posed"), NoGil());

@@ -37,6 +37,8 @@ __all__: list[str] = [
     "gradient",
     "jacobians",
     "lumped_mass",
+    "network_forward",
+    "network_gradient",
     "pose_error",
     "symmetric_dirichlet",
     "train",
@@ -334,6 +336,17 @@ def lumped_mass(
     vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
     faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+def network_forward(
+    prepared: PreparedMesh,
+    network: Network,
+    rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 9]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]: ...
+def network_gradient(
+    prepared: PreparedMesh,
+    network: Network,
+    rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 9]"],
+    grad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 9]"],
+) -> dict[str, typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]"]]: ...
 def pose_error(
     rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
     faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],

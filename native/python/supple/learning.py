@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native, arrays
+from .errors import SuppleError
+from .mesh import PreparedMesh
 from .model import Model, from_tensors
 
 
@@ -112,3 +114,46 @@ def train(
         result["steps"],
         {name: np.array(value) for name, value in result["initial"].items()},
     )
+
+
+def network_forward(
+    prepared: PreparedMesh, model: Model, rotations: ArrayLike
+) -> NDArray[np.float64]:
+    """(m, 3, 3) Jacobians of a network from a rotation signal; no Poisson solve.
+
+    Evaluated where `prepared` says (`samples`), the configuration "paper" at every vertex.
+
+    Args:
+        prepared: the rest mesh.
+        model: a network that takes the rotation signal.
+        rotations: (m, 3, 3), one a face.
+
+    Raises:
+        SuppleError: wrong_shape; bad_option for a network of the spectral signal.
+    """
+    return _native.network_forward(
+        prepared.native, model.native, _matrices(rotations, "rotations")
+    ).reshape(-1, 3, 3)
+
+
+def network_gradient(
+    prepared: PreparedMesh, model: Model, rotations: ArrayLike, grad: ArrayLike
+) -> dict[str, NDArray[np.float32]]:
+    """The gradient with respect to every weight, by name, from the one with respect to Jacobians.
+
+    Evaluates the network first; arguments and errors are those of network_forward.
+
+    Args:
+        grad: (m, 3, 3), with respect to what network_forward returns.
+    """
+    return _native.network_gradient(
+        prepared.native, model.native, _matrices(rotations, "rotations"), _matrices(grad, "grad")
+    )
+
+
+def _matrices(values: ArrayLike, what: str) -> NDArray[np.float64]:
+    """(m, 3, 3) as (m, 9)."""
+    values = np.asarray(values, dtype=np.float64)
+    if values.ndim != 3 or values.shape[1:] != (3, 3):
+        raise SuppleError("wrong_shape", f"{what} has shape {values.shape}; it must be (m, 3, 3).")
+    return np.ascontiguousarray(values.reshape(-1, 9))
