@@ -205,13 +205,14 @@ void write_array_file(const std::filesystem::path& path, const std::string& key,
 
 bool read_array_file(const std::filesystem::path& path, const std::string& key,
                      std::span<const NamedArray> arrays) {
+  errno = 0;
   std::ifstream stream(path, std::ios::binary);
   if (!stream) {
-    std::error_code ignored;  // a path that can't even be asked about holds no file for us
-    if (std::filesystem::exists(path, ignored)) {
-      fail(path, "can't be opened.");
+    // Asking now whether the file exists would answer for one that another process has just made.
+    if (errno == ENOENT || errno == ENOTDIR) {
+      return false;
     }
-    return false;
+    fail(path, std::string("can't be opened: ") + std::strerror(errno) + ".");
   }
   Reader reader(path, stream);
   const uint64_t data_start = directory_end(arrays.size());

@@ -55,11 +55,7 @@ template <int Bytes, int Width, int Vectors, int Together, class Scalar>
 SUPPLE_INLINE void transpose_columns(const Scalar* a, Eigen::Index a_stride, const Scalar* b,
                                      Eigen::Index rows, Scalar* sums) {
   using V = typename Lanes<Scalar, Bytes>::type;
-  Part<V, Vectors> s[Together];
-#pragma GCC unroll 16
-  for (int t = 0; t < Together; ++t) {
-    s[t] = load<V, Vectors>(sums + t * Width);
-  }
+  Part<V, Vectors> s[Together] = {};  // added at the end: sums of sums round less
   for (Eigen::Index i = 0; i < rows; ++i, a += a_stride, b += Width) {
     const auto value = load<V, Vectors>(b);
 #pragma GCC unroll 16
@@ -69,6 +65,7 @@ SUPPLE_INLINE void transpose_columns(const Scalar* a, Eigen::Index a_stride, con
   }
 #pragma GCC unroll 16
   for (int t = 0; t < Together; ++t) {
+    add(s[t], Scalar(1), load<V, Vectors>(sums + t * Width));
     store(s[t], sums + t * Width);
   }
 }

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Invariants and equivariant matrices of Configuration::equivariant; see learning/network.h.
+// Configuration::equivariant (learning/network.h): invariants in, equivariant matrices out.
+//
+// Everything that is smooth lives in the eigenfunctions: k x c coefficients. Only two products of a
+// thin matrix touch every vertex, one to project the signal (`project_fields`) and one to expand
+// its scales and the network's answer (`correct_faces`).
 #pragma once
 
-#include <array>
 #include <vector>
 
 #include "supple/learning/network.h"
@@ -19,8 +22,9 @@ constexpr int input_count(int fields) {
   const int n = matrix_count(fields);
   return n * (n + 1) + n + 2 * kScaleCount;
 }
-/// B_b: all matrices but the last field itself, with and without P, and Y Y^T L of the last field.
-constexpr int basis_count(int fields) { return 2 * (matrix_count(fields) - 1) + kScaleCount; }
+/// Coefficients c_b: all matrices but the last field itself, with and without P, and Y Y^T L of the
+/// last field.
+constexpr int output_count(int fields) { return 2 * (matrix_count(fields) - 1) + kScaleCount; }
 constexpr int kMaxFields = 2;
 
 template <class Scalar>
@@ -28,39 +32,36 @@ using Mat3 = Eigen::Matrix<Scalar, 3, 3, Eigen::RowMajor>;
 template <class Scalar>
 using Row3 = Eigen::Matrix<Scalar, 1, 3>;
 
-/// The matrices B_b - L of one face, for matrices given without a reference C that they share:
-/// fields X_i - C and smooth Y_is - C (fields * kScaleCount of them). Where all are equal, every
-/// one is 0, not 0 to the rounding of C. reference_defect: C C^T - I; normal: the rest normal.
+/// A signal, ready for a network. What all its matrices share, a reference C, is taken out before
+/// anything is rounded to Scalar: where all are equal, every correction is 0, not 0 to the rounding
+/// of C.
 template <class Scalar>
-std::array<Mat3<Scalar>, basis_count(kMaxFields)> face_bases(
-    const std::vector<Mat3<Scalar>>& fields, const std::vector<Mat3<Scalar>>& smooth,
-    const Row3<Scalar>& normal, const Mat3<Scalar>& reference,
-    const Mat3<Scalar>& reference_defect) {
-  std::array<Mat3<Scalar>, basis_count(kMaxFields)> bases;
-  const Mat3<Scalar>& lead = fields.back();
-  const Mat3<Scalar> whole_lead = reference + lead;
-  const Mat3<Scalar> along_normal = normal.transpose() * normal;
-  size_t next = 0;
-  const auto add = [&](const Mat3<Scalar>& matrix) {
-    bases[next++] = matrix - lead;
-    bases[next] = along_normal * bases[next - 1];
-    ++next;
-  };
-  for (size_t i = 0; i + 1 < fields.size(); ++i) {
-    add(fields[i]);
-  }
-  for (const auto& matrix : smooth) {
-    add(matrix);
-  }
-  for (size_t s = smooth.size() - kScaleCount; s < smooth.size(); ++s) {
-    // Y Y^T - I with Y = C + e.
-    const Mat3<Scalar> mixed = reference * smooth[s].transpose();
-    const Mat3<Scalar> defect =
-        reference_defect + mixed + mixed.transpose() + smooth[s] * smooth[s].transpose();
-    bases[next++] = defect * whole_lead;
-  }
-  return bases;
-}
+struct Fields {
+  const Signal* signal;            ///< not owned
+  Matrix3 reference;               ///< the mean of the last field by area; turns as the fields do
+  RowMatrix<Scalar> coefficients;  ///< k x 16 a field: 9 numbers of (X_i - C), the rest 0
+};
+
+/// Averages the signal's fields to vertices and projects them to the context's eigenfunctions.
+template <class Scalar>
+Fields<Scalar> project_fields(const NetworkContext<Scalar>& context, const Signal& signal);
+
+/// p x input_count: the invariants at the context's samples.
+template <class Scalar>
+RowMatrix<Scalar> invariants(const NetworkContext<Scalar>& context, const Fields<Scalar>& fields);
+
+/// m x 9 Jacobians: the signal's last field plus sum_b c_b (B_b - L), for k x output_count
+/// coefficients of the c_b. The smooth matrices are combined at vertices, and the combinations
+/// averaged to faces.
+template <class Scalar>
+MatrixField correct_faces(const NetworkContext<Scalar>& context, const Fields<Scalar>& fields,
+                          const RowMatrix<Scalar>& outputs);
+
+/// k x output_count: gradient with respect to `outputs` from the m x 9 one with respect to the
+/// Jacobians.
+template <class Scalar>
+RowMatrix<Scalar> correct_faces_backward(const NetworkContext<Scalar>& context,
+                                         const Fields<Scalar>& fields, const MatrixField& grad);
 
 /// Invariants of one vertex, written to `out` (input_count - 2 kScaleCount numbers).
 template <class Scalar>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "supple/learning/network.h"
 
-#include <Eigen/LU>
 #include <string>
 
 #include "equivariant.h"
@@ -13,116 +12,6 @@ namespace supple {
 namespace {
 
 using equivariant::kScaleCount;
-using equivariant::Mat3;
-using equivariant::Row3;
-
-template <class Scalar>
-Mat3<Scalar> matrix_in(const RowMatrix<Scalar>& rows, Eigen::Index r, Eigen::Index matrix) {
-  return Eigen::Map<const Mat3<Scalar>>(rows.row(r).data() + 9 * matrix);
-}
-
-// What all matrices of a signal share, taken out before anything is rounded to Scalar: the mean of
-// its last field by area. It turns with the meshes as the fields do.
-Matrix3 reference_of(const SurfaceOperators& operators, const Signal& signal) {
-  const Eigen::Matrix<double, 1, 9> sum = operators.face_areas.transpose() * signal.fields.back();
-  return Eigen::Map<const Matrix3>(sum.data()) / operators.face_areas.sum();
-}
-
-// n x 9F: the signal's fields less a reference, averaged to vertices, side by side.
-template <class Scalar>
-RowMatrix<Scalar> vertex_fields(const SurfaceOperators& operators, const Signal& signal,
-                                const Matrix3& reference) {
-  const auto fields = static_cast<Eigen::Index>(signal.fields.size());
-  RowMatrix<Scalar> result(operators.vertices.rows(), 9 * fields);
-  for (Eigen::Index i = 0; i < fields; ++i) {
-    MatrixField average = operators.average * signal.fields[static_cast<size_t>(i)];
-    average.rowwise() -= Eigen::Map<const Eigen::Matrix<double, 1, 9>>(reference.data());
-    result.middleCols(9 * i, 9) = average.cast<Scalar>();
-  }
-  return result;
-}
-
-// n x 9 F S: the vertex fields in the first eigenfunctions of each scale, field-major.
-template <class Scalar>
-RowMatrix<Scalar> smoothed_fields(const NetworkContext<Scalar>& context,
-                                  const RowMatrix<Scalar>& fields) {
-  const RowMatrix<Scalar> coefficients = product(context.weighted_functions, fields);
-  const Eigen::Index field_count = fields.cols() / 9;
-  RowMatrix<Scalar> result(fields.rows(), fields.cols() * kScaleCount);
-  RowMatrix<Scalar> smooth = RowMatrix<Scalar>::Zero(fields.rows(), fields.cols());
-  Eigen::Index done = 0;
-  for (int s = 0; s < kScaleCount; ++s) {
-    const Eigen::Index width = context.scales[static_cast<size_t>(s)] - done;
-    if (width > 0) {
-      const RowMatrix<Scalar> band = context.functions.middleCols(done, width);
-      const RowMatrix<Scalar> part = coefficients.middleRows(done, width);
-      gemm(Scalar(1), band, Op::none, part, Op::none, Scalar(1), smooth);
-      done += width;
-    }
-    for (Eigen::Index i = 0; i < field_count; ++i) {
-      result.middleCols(9 * (i * kScaleCount + s), 9) = smooth.middleCols(9 * i, 9);
-    }
-  }
-  return result;
-}
-
-template <class Scalar>
-RowMatrix<Scalar> invariants(const NetworkContext<Scalar>& context, const RowMatrix<Scalar>& fields,
-                             const RowMatrix<Scalar>& smooth, const Mat3<Scalar>& reference) {
-  const Eigen::Index field_count = fields.cols() / 9;
-  const Eigen::Index smooth_count = smooth.cols() / 9;
-  RowMatrix<Scalar> result(context.samples.size(),
-                           equivariant::input_count(static_cast<int>(field_count)));
-#pragma omp parallel
-  {
-    std::vector<Mat3<Scalar>> matrices(static_cast<size_t>(field_count + smooth_count));
-#pragma omp for schedule(static)
-    for (Eigen::Index p = 0; p < context.samples.size(); ++p) {
-      const int v = context.samples[p];
-      for (Eigen::Index i = 0; i < field_count; ++i) {
-        matrices[static_cast<size_t>(i)] = reference + matrix_in(fields, v, i);
-      }
-      for (Eigen::Index i = 0; i < smooth_count; ++i) {
-        matrices[static_cast<size_t>(field_count + i)] = reference + matrix_in(smooth, v, i);
-      }
-      const Row3<Scalar> normal = context.operators->vertex_normals.row(v).template cast<Scalar>();
-      equivariant::point_invariants(matrices, normal, result.row(p).data());
-      result.row(p).tail(2 * kScaleCount) = context.shape.row(p);
-    }
-  }
-  return result;
-}
-
-// Calls visit(f, bases) with B_b - L for each face, in parallel.
-template <class Scalar, class Visit>
-void for_each_face_bases(const NetworkContext<Scalar>& context, const Signal& signal,
-                         const RowMatrix<Scalar>& smooth, const Visit& visit) {
-  const SurfaceOperators& operators = *context.operators;
-  const Matrix3 exact_reference = reference_of(operators, signal);
-  const Mat3<Scalar> reference = exact_reference.template cast<Scalar>();
-  const Mat3<Scalar> defect =
-      (exact_reference * exact_reference.transpose() - Matrix3::Identity()).template cast<Scalar>();
-  const auto smooth_count = static_cast<size_t>(smooth.cols() / 9);
-#pragma omp parallel
-  {
-    std::vector<Mat3<Scalar>> here(signal.fields.size()), smooth_here(smooth_count);
-#pragma omp for schedule(static)
-    for (Eigen::Index f = 0; f < operators.faces.rows(); ++f) {
-      for (size_t i = 0; i < here.size(); ++i) {
-        here[i] = (matrix_at(signal.fields[i], f) - exact_reference).template cast<Scalar>();
-      }
-      for (size_t i = 0; i < smooth_count; ++i) {
-        smooth_here[i].setZero();
-        for (int c = 0; c < 3; ++c) {
-          smooth_here[i] += matrix_in(smooth, operators.faces(f, c), static_cast<Eigen::Index>(i));
-        }
-        smooth_here[i] *= Scalar(1.0 / 3.0);
-      }
-      const Row3<Scalar> normal = operators.face_normals.row(f).template cast<Scalar>();
-      visit(f, equivariant::face_bases(here, smooth_here, normal, reference, defect));
-    }
-  }
-}
 
 template <class Scalar>
 RowMatrix<Scalar> read_tensor(const std::map<std::string, RowMatrix<float>>& tensors,
@@ -169,7 +58,7 @@ LayerSizes Architecture::sizes() const {
   sizes.width = width;
   if (configuration == Configuration::equivariant) {
     sizes.inputs = equivariant::input_count(field_count(signal));
-    sizes.outputs = equivariant::basis_count(field_count(signal));
+    sizes.outputs = equivariant::output_count(field_count(signal));
   }
   return sizes;
 }
@@ -204,8 +93,6 @@ void NetworkContext<Scalar>::complete(const Eigenbasis& basis) {
   const SurfaceOperators& surface = *operators;
   const Eigen::Index k = domain.functions.cols();
   functions = basis.functions.leftCols(k).template cast<Scalar>();
-  weighted_functions =
-      (basis.functions.leftCols(k).transpose() * basis.mass.asDiagonal()).template cast<Scalar>();
   shape.resize(samples.size(), 2 * kScaleCount);
   for (int s = 0; s < kScaleCount; ++s) {
     const Eigen::Index count = std::min(k, basis.stable_count(equivariant::scale_limit(s)));
@@ -264,66 +151,40 @@ void LocalJacobianNetwork<Scalar>::set_normalisation(const Row& mean, const Row&
 }
 
 template <class Scalar>
-RowMatrix<Scalar> LocalJacobianNetwork<Scalar>::inputs(const NetworkContext<Scalar>& context,
-                                                       const Signal& signal,
-                                                       RowMatrix<Scalar>* smooth) const {
-  if (architecture_.configuration == Configuration::equivariant) {
-    const Matrix3 reference = reference_of(*context.operators, signal);
-    const RowMatrix<Scalar> fields = vertex_fields<Scalar>(*context.operators, signal, reference);
-    *smooth = smoothed_fields(context, fields);
-    return invariants<Scalar>(context, fields, *smooth, reference.template cast<Scalar>());
-  }
-  const RowMatrix<Scalar> fields =
-      vertex_fields<Scalar>(*context.operators, signal, Matrix3::Zero());
-  RowMatrix<Scalar> result(context.samples.size(), 9);
-  for (Eigen::Index p = 0; p < result.rows(); ++p) {
-    result.row(p) = fields.row(context.samples[p]).head(9);
-  }
-  return result;
-}
-
-template <class Scalar>
 RowMatrix<Scalar> LocalJacobianNetwork<Scalar>::raw_inputs(const NetworkContext<Scalar>& context,
                                                            const Signal& signal) const {
-  RowMatrix<Scalar> smooth;
-  return inputs(context, signal, &smooth);
+  if (architecture_.configuration == Configuration::equivariant) {
+    return equivariant::invariants(context, equivariant::project_fields(context, signal));
+  }
+  RowMatrix<Scalar> result(context.samples.size(), 9);
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index p = 0; p < result.rows(); ++p) {
+    result.row(p) = vertex_average(*context.operators, signal.fields.front(), context.samples[p])
+                        .template cast<Scalar>();
+  }
+  return result;
 }
 
 template <class Scalar>
 MatrixField LocalJacobianNetwork<Scalar>::forward(const NetworkContext<Scalar>& context,
                                                   const Signal& signal, Trace* trace) const {
-  const SurfaceOperators& operators = *context.operators;
-  RowMatrix<Scalar> smooth;
-  RowMatrix<Scalar> input = inputs(context, signal, &smooth);
-  input.rowwise() -= mean_;
-  input.array().rowwise() *= scale_.array();
-  RowMatrix<Scalar> output =
-      spectral_mlp_forward(architecture_.sizes(), parameters_, context.domain, input,
-                           trace != nullptr ? &trace->mlp : nullptr);
-
-  MatrixField result(operators.faces.rows(), 9);
+  const auto layers = [&](RowMatrix<Scalar> input) {
+    input.rowwise() -= mean_;
+    input.array().rowwise() *= scale_.array();
+    return spectral_mlp_forward(architecture_.sizes(), parameters_, context.domain, input,
+                                trace != nullptr ? &trace->mlp : nullptr);
+  };
   if (architecture_.configuration == Configuration::paper) {
-    if (output.rows() != operators.vertices.rows()) {
+    const RowMatrix<Scalar> output = layers(raw_inputs(context, signal));
+    if (output.rows() != context.operators->vertices.rows()) {
       throw Error(ErrorCode::bad_option,
                   "The 'paper' configuration is evaluated at every vertex: use 0 samples.");
     }
-    result = average_vertices_to_faces(operators.faces, output).template cast<double>();
-    return result;
+    return average_vertices_to_faces(context.operators->faces, output).template cast<double>();
   }
-  const RowMatrix<Scalar> at_vertices =
-      product(context.functions, product(context.domain.projector, output));
-  const RowMatrix<Scalar> coefficients = average_vertices_to_faces(operators.faces, at_vertices);
-  for_each_face_bases(context, signal, smooth, [&](Eigen::Index f, const auto& bases) {
-    Mat3<Scalar> correction = Mat3<Scalar>::Zero();
-    for (Eigen::Index b = 0; b < coefficients.cols(); ++b) {
-      correction += coefficients(f, b) * bases[static_cast<size_t>(b)];
-    }
-    matrix_at(result, f) = matrix_at(signal.fields.back(), f) + correction.template cast<double>();
-  });
-  if (trace != nullptr) {
-    trace->smooth = std::move(smooth);
-  }
-  return result;
+  const auto fields = equivariant::project_fields(context, signal);
+  const RowMatrix<Scalar> output = layers(equivariant::invariants(context, fields));
+  return equivariant::correct_faces(context, fields, product(context.domain.projector, output));
 }
 
 template <class Scalar>
@@ -331,24 +192,14 @@ void LocalJacobianNetwork<Scalar>::backward(const NetworkContext<Scalar>& contex
                                             const Signal& signal, const Trace& trace,
                                             const MatrixField& grad,
                                             LayerParameters<Scalar>& gradient) const {
-  const SurfaceOperators& operators = *context.operators;
-  const Eigen::Index n = operators.vertices.rows();
   RowMatrix<Scalar> grad_output;
   if (architecture_.configuration == Configuration::paper) {
     const RowMatrix<Scalar> grad_faces = grad.template cast<Scalar>();
-    grad_output = average_vertices_to_faces_backward(operators.faces, n, grad_faces);
+    grad_output = average_vertices_to_faces_backward(
+        context.operators->faces, context.operators->vertices.rows(), grad_faces);
   } else {
-    RowMatrix<Scalar> grad_coefficients(operators.faces.rows(), architecture_.sizes().outputs);
-    for_each_face_bases(context, signal, trace.smooth, [&](Eigen::Index f, const auto& bases) {
-      const Mat3<Scalar> g = matrix_at(grad, f).template cast<Scalar>();
-      for (Eigen::Index b = 0; b < grad_coefficients.cols(); ++b) {
-        grad_coefficients(f, b) = bases[static_cast<size_t>(b)].cwiseProduct(g).sum();
-      }
-    });
-    const RowMatrix<Scalar> at_vertices =
-        average_vertices_to_faces_backward(operators.faces, n, grad_coefficients);
-    const RowMatrix<Scalar> spectral =
-        product(context.functions, Op::transpose, at_vertices, Op::none);
+    const RowMatrix<Scalar> spectral = equivariant::correct_faces_backward(
+        context, equivariant::project_fields(context, signal), grad);
     grad_output = product(context.domain.projector, Op::transpose, spectral, Op::none);
   }
   spectral_mlp_backward(architecture_.sizes(), parameters_, context.domain, trace.mlp, grad_output,

@@ -33,4 +33,14 @@ struct SurfaceOperators {
   MatrixField divergence_backward(const Points& grad) const;
 };
 
+/// The paper's average of an m x 9 field at one vertex, as row i of `average` times the field.
+inline Eigen::Matrix<double, 1, 9> vertex_average(const SurfaceOperators& operators,
+                                                  const MatrixField& field, Eigen::Index i) {
+  Eigen::Matrix<double, 1, 9> sum = Eigen::Matrix<double, 1, 9>::Zero();
+  for (SparseRowMatrix::InnerIterator it(operators.average, i); it; ++it) {
+    sum += it.value() * field.row(it.col());
+  }
+  return sum;
+}
+
 }  // namespace supple

@@ -34,12 +34,11 @@ enum class Configuration {
   /// scaled by
   /// the training set's mean and deviation.
   /// Out: coefficients c_b, projected to the eigenfunctions, of matrices at each face,
-  ///   J = L + sum_b c_b (B_b - L),  B_b from X_i, P X_i, Y_is, P Y_is (P = n^T n; for P, P (X -
-  ///   L)) and
-  ///   Y_s Y_s^T L of the last field.
+  ///   J = L + sum_b c_b (B_b - L), with B_b from X_i, Y_is and Y_s Y_s^T L of the last field, and
+  ///   P (X_i - L), P (Y_is - L), P = n^T n.
+  /// What is smooth is combined at vertices, and its average taken to faces.
   /// All invariants stay and every B_b turns with J, so the answer turns with the meshes exactly;
-  /// and
-  /// where the signal is one rotation, every B_b - L is 0 and J is that rotation.
+  /// and where the signal is one rotation, every B_b - L is 0 and J is that rotation.
   equivariant,
 };
 const char* to_string(Configuration configuration);
@@ -74,7 +73,6 @@ struct NetworkContext {
   Eigen::VectorXi samples;                      ///< p vertex indices
   SpectralDomain<Scalar> domain;                ///< the eigenfunctions at the samples
   RowMatrix<Scalar> functions;                  ///< n x k at every vertex
-  RowMatrix<Scalar> weighted_functions;         ///< k x n, Phi^T M
   std::vector<Eigen::Index> scales;  ///< ascending counts of eigenfunctions, the last is k
   RowMatrix<Scalar> shape;           ///< p x 2 scales: distance to the smoothed surface
 
@@ -106,7 +104,6 @@ class LocalJacobianNetwork {
 
   struct Trace {
     SpectralMlpTrace<Scalar> mlp;
-    RowMatrix<Scalar> smooth;  // n x 9 (fields * scales), less the reference
   };
   /// m x 9 Jacobians of a signal.
   MatrixField forward(const NetworkContext<Scalar>& context, const Signal& signal,
@@ -118,9 +115,6 @@ class LocalJacobianNetwork {
   RowMatrix<Scalar> raw_inputs(const NetworkContext<Scalar>& context, const Signal& signal) const;
 
  private:
-  RowMatrix<Scalar> inputs(const NetworkContext<Scalar>& context, const Signal& signal,
-                           RowMatrix<Scalar>* smooth) const;
-
   Architecture architecture_;
   LayerParameters<Scalar> parameters_;
   Row mean_, scale_;
