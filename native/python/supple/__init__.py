@@ -7,11 +7,9 @@ Source: "Deformation Recovery: Localized Learning for Detail-Preserving Deformat
 2024.
 """
 
-import os
+from . import _environment
 
-# OpenMP's threads spin between loops unless told to sleep, and beside a busy Blender that costs far
-# more than waking them (measured 17 times on 2 cores). Read when the native module loads.
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+_environment.prepare()  # before the native module loads
 
 from . import cache
 from ._native import PreparedCache, Progress, __version__

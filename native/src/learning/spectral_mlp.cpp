@@ -6,37 +6,9 @@
 
 #include "supple/core/dense.h"
 #include "supple/core/error.h"
+#include "supple/learning/silu.h"
 
 namespace supple {
-namespace {
-
-// SiLU and its derivative, in place over whole matrices.
-template <class Scalar>
-RowMatrix<Scalar> activation(const RowMatrix<Scalar>& x) {
-  RowMatrix<Scalar> y(x.rows(), x.cols());
-#pragma omp parallel for schedule(static)
-  for (Eigen::Index i = 0; i < x.rows(); ++i) {
-    const auto row = x.row(i).array();
-    y.row(i).array() = row / (Scalar(1) + (-row).exp());
-  }
-  return y;
-}
-
-template <class Scalar>
-RowMatrix<Scalar> activation_backward(const RowMatrix<Scalar>& x, const RowMatrix<Scalar>& grad) {
-  RowMatrix<Scalar> result(x.rows(), x.cols());
-#pragma omp parallel for schedule(static)
-  for (Eigen::Index i = 0; i < x.rows(); ++i) {
-    const auto row = x.row(i).array();
-    const auto sigmoid = (Scalar(1) / (Scalar(1) + (-row).exp())).eval();
-    result.row(i).array() =
-        grad.row(i).array() * sigmoid * (Scalar(1) + row * (Scalar(1) - sigmoid));
-  }
-  return result;
-}
-
-}  // namespace
-
 template <class Scalar>
 LayerParameters<Scalar> LayerParameters<Scalar>::zeros(const LayerSizes& sizes) {
   LayerParameters result;
@@ -97,8 +69,7 @@ RowMatrix<Scalar> spectral_mlp_forward(const LayerSizes& sizes,
   for (int l = 0; l <= sizes.projected; ++l) {
     hidden = l == 0 ? product(input, parameters.weights[0])
                     : product(domain.functions, product(spectral, parameters.weights[l]));
-    hidden.rowwise() += parameters.biases[l];
-    RowMatrix<Scalar> active = activation(hidden);
+    RowMatrix<Scalar> active = add_bias_and_silu(parameters.biases[l], hidden);
     if (trace != nullptr) {
       trace->preactivation.push_back(std::move(hidden));
     }
@@ -132,7 +103,7 @@ RowMatrix<Scalar> spectral_mlp_backward(const LayerSizes& sizes,
   RowMatrix<Scalar> grad_active =
       product(grad_output, Op::none, parameters.weights.back(), Op::transpose);
   for (int l = sizes.projected; l >= 0; --l) {
-    const RowMatrix<Scalar> grad_hidden = activation_backward(trace.preactivation[l], grad_active);
+    const RowMatrix<Scalar> grad_hidden = silu_backward(trace.preactivation[l], grad_active);
     gradient.biases[l] += grad_hidden.colwise().sum();
     if (l == 0) {
       gemm(one, trace.input, Op::transpose, grad_hidden, Op::none, one, gradient.weights[0]);

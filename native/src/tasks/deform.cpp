@@ -44,8 +44,8 @@ Points deform(const PreparedMesh& prepared, const Points& target, int count,
   const MatrixField predicted =
       network == nullptr ? signal.fields.front()
                          : network->forward(*prepared.context_for(network->architecture()), signal);
-  const FreePoisson poisson(source.laplacian, source.mass, source.component,
-                            source.component_count);
+  const FreePoisson poisson(source.laplacian, source.mass, source.component, source.component_count,
+                            prepared.symbolic);
   const Points centred = poisson.solve(source.divergence_of(predicted));
   const Points placed = centred + (truth - poisson.centred(truth));
   const Points moved = mesh.to_surface(target_mesh.from_surface(placed));

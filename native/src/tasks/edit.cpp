@@ -24,10 +24,6 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-SparseMatrix biharmonic_matrix(const SurfaceOperators& operators) {
-  return operators.laplacian * operators.mass.cwiseInverse().asDiagonal() * operators.laplacian;
-}
-
 Matrix3 row_rotation(const Eigen::Matrix4d& matrix) {
   return closest_rotation(Matrix3(matrix.topLeftCorner<3, 3>().transpose()));
 }
@@ -111,9 +107,10 @@ Editor::Editor(std::shared_ptr<const PreparedMesh> prepared, std::vector<Handle>
   held_ = Eigen::Map<Eigen::VectorXi>(held.data(), static_cast<Eigen::Index>(held.size()));
   held_slot_ = Eigen::Map<Eigen::VectorXi>(slots.data(), static_cast<Eigen::Index>(slots.size()));
 
-  poisson_ = std::make_unique<HeldSystem>(operators.laplacian, held_);
+  poisson_ = std::make_unique<HeldSystem>(operators.laplacian, held_, prepared_->symbolic);
   progress.report(0.3);
-  biharmonic_ = std::make_unique<HeldSystem>(biharmonic_matrix(operators), held_);
+  const PreparedMesh::Biharmonic& biharmonic = prepared_->biharmonic();
+  biharmonic_ = std::make_unique<HeldSystem>(biharmonic.matrix, held_, biharmonic.symbolic);
   progress.report(1.0);
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <string>
+#include <vector>
 
 #include "supple/core/content_hash.h"
 #include "supple/core/error.h"
@@ -13,7 +14,7 @@ namespace {
 // Part of every key. Raise it when what is computed below changes, be it in the last bit, or the
 // arrays that are kept do: files of before are then not met again, and go as the least recently
 // used.
-constexpr int kPreparedVersion = 1;
+constexpr int kPreparedVersion = 2;
 
 // Meshes of fewer vertices are not cached: they are prepared in less time than a file takes to be
 // written to a disk.
@@ -37,17 +38,29 @@ std::string key_of(const SurfaceOperators& operators, const PrepareOptions& opti
 // What takes long to compute, in the form in which it is kept.
 struct Kept {
   Eigen::VectorXd residual{1};
-  Eigen::VectorXi samples;
+  Eigen::VectorXi ordering, samples;
   RowMatrix<float> projector;
 
   std::vector<NamedArray> arrays(Eigenbasis& basis) {
     return {{"eigenfunctions", basis.functions},
             {"eigenvalues", basis.values},
             {"residual", residual},
+            {"ordering", ordering},
             {"samples", samples},
             {"projector", projector}};
   }
 };
+
+bool is_permutation_of(const Eigen::VectorXi& ordering, Eigen::Index n) {
+  std::vector<int> sorted(ordering.data(), ordering.data() + ordering.size());
+  std::sort(sorted.begin(), sorted.end());
+  for (size_t i = 0; i < sorted.size(); ++i) {
+    if (sorted[i] != static_cast<int>(i)) {
+      return false;
+    }
+  }
+  return static_cast<Eigen::Index>(sorted.size()) == n;
+}
 
 }  // namespace
 
@@ -70,9 +83,10 @@ PreparedMesh::PreparedMesh(const Points& vertices, const Faces& faces,
 }
 
 void PreparedMesh::compute(const PrepareOptions& options, const ProgressRange& progress) {
+  symbolic = std::make_shared<const SymbolicCholesky>(operators.laplacian);
   // One more than is used: where to cut is read from the gap above.
   basis = eigenbasis(operators.laplacian, operators.mass, {.count = options.eigenfunctions + 1},
-                     progress.stage("eigenbasis", 0.05, 0.9));
+                     progress.stage("eigenbasis", 0.05, 0.9), symbolic);
   sampled = NetworkContext<float>(operators, basis, options.eigenfunctions,
                                   Eigen::Index{options.samples});
 }
@@ -87,13 +101,16 @@ bool PreparedMesh::load(const PrepareOptions& options, const PreparedCache& cach
   const auto fits = [&] {
     return basis.functions.rows() == n && basis.functions.cols() == count &&
            basis.values.size() == count && kept.residual.size() == 1 &&
-           kept.samples.size() == points && kept.samples.minCoeff() >= 0 &&
-           kept.samples.maxCoeff() < n && kept.projector.cols() == points &&
+           is_permutation_of(kept.ordering, n) && kept.samples.size() == points &&
+           kept.samples.minCoeff() >= 0 && kept.samples.maxCoeff() < n &&
+           kept.projector.cols() == points &&
            kept.projector.rows() == basis.stable_count(options.eigenfunctions);
   };
   if (!cache.load(key, kept.arrays(basis), fits, notes)) {
     return false;
   }
+  symbolic = std::make_shared<const SymbolicCholesky>(
+      operators.laplacian, SymbolicCholesky::default_backend(), kept.ordering);
   basis.mass = operators.mass;
   basis.residual = kept.residual[0];
   sampled = NetworkContext<float>(operators, basis, options.eigenfunctions, std::move(kept.samples),
@@ -104,9 +121,20 @@ bool PreparedMesh::load(const PrepareOptions& options, const PreparedCache& cach
 void PreparedMesh::store(const PreparedCache& cache, const std::string& key) {
   Kept kept;
   kept.residual[0] = basis.residual;
+  kept.ordering = symbolic->ordering();
   kept.samples = sampled.samples;
   kept.projector = sampled.domain.projector;
   cache.store(key, kept.arrays(basis), notes);
+}
+
+const PreparedMesh::Biharmonic& PreparedMesh::biharmonic() const {
+  std::call_once(biharmonic_once_, [this] {
+    biharmonic_.matrix =
+        operators.laplacian * operators.mass.cwiseInverse().asDiagonal() * operators.laplacian;
+    biharmonic_.symbolic =
+        std::make_shared<const SymbolicCholesky>(biharmonic_.matrix, symbolic->backend());
+  });
+  return biharmonic_;
 }
 
 std::shared_ptr<const NetworkContext<float>> PreparedMesh::context_for(

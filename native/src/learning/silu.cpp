@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "supple/learning/silu.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+
+#include "supple/core/simd.h"
+
+namespace supple {
+namespace {
+
+// exp of each lane, |x| <= 87: 2^k times a polynomial on |r| <= ln(2) / 2 (Cody and Waite 1980).
+// By reference: a vector passed by value has another ABI for each instruction set.
+template <int Bytes, class V>
+SUPPLE_INLINE void exponential(V& x) {
+  using I = typename Lanes<int32_t, Bytes>::type;
+  const V limit = V{} + 87.0f;
+  x = x > limit ? limit : x;
+  x = x < -limit ? -limit : x;
+  // Adding 1.5 * 2^23 rounds to the nearest whole number.
+  const V magic = V{} + 12582912.0f;
+  const V k = (x * 1.44269504f + magic) - magic;
+  const V r = (x - k * 0.693359375f) + k * 2.12194440e-4f;
+  V p = r * 1.9875691500e-4f + 1.3981999507e-3f;
+  p = p * r + 8.3334519073e-3f;
+  p = p * r + 4.1665795894e-2f;
+  p = p * r + 1.6666665459e-1f;
+  p = p * r + 5.0000001201e-1f;
+  p = p * (r * r) + r + 1.0f;
+  const I bits = (__builtin_convertvector(k, I) + 127) << 23;
+  x = p * reinterpret_cast<V>(bits);
+}
+
+template <int Bytes>
+SUPPLE_INLINE void forward_row(const float* bias, float* x, float* y, Eigen::Index count) {
+  using V = typename Lanes<float, Bytes>::type;
+  constexpr int lanes = Lanes<float, Bytes>::count;
+  Eigen::Index i = 0;
+  for (; i < count; i += lanes) {
+    const size_t bytes =
+        sizeof(float) * static_cast<size_t>(std::min<Eigen::Index>(lanes, count - i));
+    V value = {}, b = {};
+    std::memcpy(&value, x + i, bytes);
+    std::memcpy(&b, bias + i, bytes);
+    value += b;
+    V power = -value;
+    exponential<Bytes>(power);
+    const V result = value / (1.0f + power);
+    std::memcpy(x + i, &value, bytes);
+    std::memcpy(y + i, &result, bytes);
+  }
+}
+
+template <int Bytes>
+SUPPLE_INLINE void backward_row(const float* x, const float* grad, float* out, Eigen::Index count) {
+  using V = typename Lanes<float, Bytes>::type;
+  constexpr int lanes = Lanes<float, Bytes>::count;
+  for (Eigen::Index i = 0; i < count; i += lanes) {
+    const size_t bytes =
+        sizeof(float) * static_cast<size_t>(std::min<Eigen::Index>(lanes, count - i));
+    V value = {}, g = {};
+    std::memcpy(&value, x + i, bytes);
+    std::memcpy(&g, grad + i, bytes);
+    V power = -value;
+    exponential<Bytes>(power);
+    const V sigmoid = 1.0f / (1.0f + power);
+    const V result = g * sigmoid * (1.0f + value * (1.0f - sigmoid));
+    std::memcpy(out + i, &result, bytes);
+  }
+}
+
+using RowForward = void (*)(const float*, float*, float*, Eigen::Index);
+using RowBackward = void (*)(const float*, const float*, float*, Eigen::Index);
+
+SUPPLE_AVX512 void forward_avx512(const float* bias, float* x, float* y, Eigen::Index count) {
+  forward_row<64>(bias, x, y, count);
+}
+SUPPLE_AVX2 void forward_avx2(const float* bias, float* x, float* y, Eigen::Index count) {
+  forward_row<32>(bias, x, y, count);
+}
+void forward_plain(const float* bias, float* x, float* y, Eigen::Index count) {
+  forward_row<16>(bias, x, y, count);
+}
+SUPPLE_AVX512 void backward_avx512(const float* x, const float* grad, float* out,
+                                   Eigen::Index count) {
+  backward_row<64>(x, grad, out, count);
+}
+SUPPLE_AVX2 void backward_avx2(const float* x, const float* grad, float* out, Eigen::Index count) {
+  backward_row<32>(x, grad, out, count);
+}
+void backward_plain(const float* x, const float* grad, float* out, Eigen::Index count) {
+  backward_row<16>(x, grad, out, count);
+}
+
+void forward(const float* bias, float* x, float* y, Eigen::Index count) {
+  static const RowForward kernel =
+      best_kernel<RowForward>(forward_avx512, forward_avx2, forward_plain);
+  kernel(bias, x, y, count);
+}
+void backward(const float* x, const float* grad, float* out, Eigen::Index count) {
+  static const RowBackward kernel =
+      best_kernel<RowBackward>(backward_avx512, backward_avx2, backward_plain);
+  kernel(x, grad, out, count);
+}
+
+// Double is for checking derivatives.
+void forward(const double* bias, double* x, double* y, Eigen::Index count) {
+  for (Eigen::Index i = 0; i < count; ++i) {
+    x[i] += bias[i];
+    y[i] = x[i] / (1.0 + std::exp(-x[i]));
+  }
+}
+void backward(const double* x, const double* grad, double* out, Eigen::Index count) {
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const double sigmoid = 1.0 / (1.0 + std::exp(-x[i]));
+    out[i] = grad[i] * sigmoid * (1.0 + x[i] * (1.0 - sigmoid));
+  }
+}
+
+}  // namespace
+
+template <class Scalar>
+RowMatrix<Scalar> add_bias_and_silu(const Eigen::Matrix<Scalar, 1, Eigen::Dynamic>& bias,
+                                    RowMatrix<Scalar>& hidden) {
+  RowMatrix<Scalar> result(hidden.rows(), hidden.cols());
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index i = 0; i < hidden.rows(); ++i) {
+    forward(bias.data(), hidden.row(i).data(), result.row(i).data(), hidden.cols());
+  }
+  return result;
+}
+
+template <class Scalar>
+RowMatrix<Scalar> silu_backward(const RowMatrix<Scalar>& x, const RowMatrix<Scalar>& grad) {
+  RowMatrix<Scalar> result(x.rows(), x.cols());
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
+    backward(x.row(i).data(), grad.row(i).data(), result.row(i).data(), x.cols());
+  }
+  return result;
+}
+
+template RowMatrix<float> add_bias_and_silu(const Eigen::Matrix<float, 1, Eigen::Dynamic>&,
+                                            RowMatrix<float>&);
+template RowMatrix<double> add_bias_and_silu(const Eigen::Matrix<double, 1, Eigen::Dynamic>&,
+                                             RowMatrix<double>&);
+template RowMatrix<float> silu_backward(const RowMatrix<float>&, const RowMatrix<float>&);
+template RowMatrix<double> silu_backward(const RowMatrix<double>&, const RowMatrix<double>&);
+
+}  // namespace supple
