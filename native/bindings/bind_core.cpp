@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings.h"
+#include "supple/core/dense.h"
 #include "supple/core/error.h"
+#include "supple/core/parallel.h"
+#include "supple/core/simd.h"
 
 namespace supple::bindings {
 
@@ -30,6 +33,11 @@ void bind_core(py::module_& module) {
                              "Estimated seconds left; None before 2% is done.")
       .def_property_readonly("cancelled", &Progress::cancelled, "Whether cancel was called.")
       .def("cancel", &Progress::cancel, "Ask the call to stop; it raises Cancelled soon after.");
+
+  module.def("thread_count", &thread_count);
+  module.def("set_thread_count", &set_thread_count, py::arg("count"));
+  module.def("simd_level", [] { return to_string(simd_level()); });
+  module.def("blas_name", &blas_name);
 }
 
 }  // namespace supple::bindings

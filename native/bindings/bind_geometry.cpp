@@ -1,11 +1,33 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <optional>
+#include <variant>
+
 #include "bindings.h"
 #include "supple/geometry/jacobians.h"
 #include "supple/geometry/mesh.h"
 #include "supple/geometry/operators.h"
-#include "supple/spectral/eigenbasis.h"
+#include "supple/geometry/sparse_cholesky.h"
 
 namespace supple::bindings {
+namespace {
+
+// A permutation, or the name of a way to find one.
+using Ordering = std::variant<std::string, Eigen::VectorXi>;
+
+SparseCholesky factored(const SparseMatrix& matrix, const std::optional<std::string>& backend,
+                        const Ordering& ordering) {
+  check_symmetric(matrix);
+  const CholeskyBackend with =
+      backend ? cholesky_backend(*backend) : SparseCholesky::default_backend();
+  const auto* const name = std::get_if<std::string>(&ordering);
+  return SparseCholesky(
+      matrix, name != nullptr
+                  ? std::make_shared<const SymbolicCholesky>(matrix, with, cholesky_ordering(*name))
+                  : std::make_shared<const SymbolicCholesky>(matrix, with,
+                                                             std::get<Eigen::VectorXi>(ordering)));
+}
+
+}  // namespace
 
 void bind_geometry(py::module_& module) {
   py::class_<Note>(module, "Note")
@@ -28,16 +50,16 @@ void bind_geometry(py::module_& module) {
       },
       py::arg("rest"), py::arg("faces"), py::arg("moved"), NoGil());
   module.def("closest_rotations", &closest_rotations, py::arg("jacobians"), NoGil());
-  module.def(
-      "eigenbasis",
-      [](const Points& vertices, const Faces& faces, int count, Progress* progress) {
-        const Eigenbasis basis =
-            eigenbasis(cotan_laplacian(vertices, faces), lumped_mass(vertices, faces),
-                       {.count = count}, range(progress));
-        return std::make_tuple(basis.functions, basis.values, basis.residual);
-      },
-      py::arg("vertices"), py::arg("faces"), py::arg("count"), py::arg("progress") = nullptr,
-      NoGil());
+
+  py::class_<SparseCholesky>(module, "SparseCholesky")
+      .def(py::init(&factored), py::arg("matrix"), py::arg("backend") = py::none(),
+           py::arg("ordering") = "automatic", NoGil())
+      .def("solve", &SparseCholesky::solve, py::arg("rhs"), NoGil())
+      .def_property_readonly("size", &SparseCholesky::size)
+      .def_property_readonly(
+          "ordering",
+          [](const SparseCholesky& self) -> Eigen::VectorXi { return self.symbolic().ordering(); })
+      .def_property_readonly("factor_entries", &SparseCholesky::factor_entries);
 }
 
 }  // namespace supple::bindings

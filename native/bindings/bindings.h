@@ -20,6 +20,7 @@ inline ProgressRange range(Progress* progress) { return ProgressRange(progress);
 
 void bind_core(py::module_& module);
 void bind_geometry(py::module_& module);
+void bind_spectral(py::module_& module);
 void bind_learning(py::module_& module);
 void bind_cache(py::module_& module);
 void bind_tasks(py::module_& module);

@@ -6,6 +6,7 @@ PYBIND11_MODULE(_native, module) {
   module.attr("__version__") = SUPPLE_VERSION;
   supple::bindings::bind_core(module);
   supple::bindings::bind_geometry(module);
+  supple::bindings::bind_spectral(module);
   supple::bindings::bind_learning(module);
   supple::bindings::bind_cache(module);
   supple::bindings::bind_tasks(module);

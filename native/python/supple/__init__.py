@@ -12,7 +12,7 @@ from . import _environment
 _environment.prepare()  # before the native module loads
 
 from . import cache
-from ._native import PreparedCache, Progress, __version__
+from ._native import PreparedCache, Progress, __version__, blas_name, simd_level
 from .deforming import deform
 from .editing import Editor, EditResult, Handle, edit
 from .errors import Cancelled, SuppleError
@@ -20,6 +20,7 @@ from .learning import TrainResult, train
 from .mesh import Mesh, Note, PreparedMesh
 from .metrics import face_distortion, flipped_faces, pose_error, symmetric_dirichlet
 from .model import Model, load_model, shipped_models
+from .parallel import set_thread_count, thread_count
 
 __all__ = [
     "Cancelled",
@@ -35,6 +36,7 @@ __all__ = [
     "SuppleError",
     "TrainResult",
     "__version__",
+    "blas_name",
     "cache",
     "deform",
     "edit",
@@ -42,7 +44,10 @@ __all__ = [
     "flipped_faces",
     "load_model",
     "pose_error",
+    "set_thread_count",
     "shipped_models",
+    "simd_level",
     "symmetric_dirichlet",
+    "thread_count",
     "train",
 ]

@@ -18,15 +18,18 @@ __all__: list[str] = [
     "Architecture",
     "EditReport",
     "Editor",
+    "EmbeddingRecovery",
     "Handle",
     "HandleTarget",
     "Network",
     "Note",
     "PreparedMesh",
     "Progress",
+    "SparseCholesky",
     "TrainOptions",
     "TrainingPair",
     "TriangleMesh",
+    "blas_name",
     "closest_rotations",
     "cotan_laplacian",
     "deform",
@@ -34,15 +37,22 @@ __all__: list[str] = [
     "face_areas",
     "face_distortion",
     "flipped_faces",
+    "functional_map",
     "gradient",
     "jacobians",
     "lumped_mass",
+    "nearest_rows",
     "network_forward",
     "network_gradient",
+    "point_map",
     "pose_error",
+    "set_thread_count",
+    "simd_level",
     "symmetric_dirichlet",
+    "thread_count",
     "train",
     "train_double",
+    "zoomout",
 ]
 
 class Progress:
@@ -93,6 +103,42 @@ class TriangleMesh:
     ) -> None: ...
     @property
     def notes(self) -> list[Note]: ...
+
+class SparseCholesky:
+    def __init__(
+        self,
+        matrix: scipy.sparse.csc_matrix,
+        backend: str | None = None,
+        ordering: str
+        | typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"] = "automatic",
+    ) -> None: ...
+    def solve(
+        self, rhs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+    @property
+    def factor_entries(self) -> int: ...
+    @property
+    def ordering(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
+    @property
+    def size(self) -> int: ...
+
+class EmbeddingRecovery:
+    def __init__(
+        self,
+        vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+        faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+        form: str = "product",
+        pull: typing.SupportsFloat | typing.SupportsIndex = 4000.0,
+        point_weight: typing.SupportsFloat | typing.SupportsIndex = 20000.0,
+        jacobian_weight: typing.SupportsFloat | typing.SupportsIndex = 150000.0,
+    ) -> None: ...
+    def solve(
+        self,
+        coarse: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+        jacobians: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 9]"],
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @property
+    def factor_entries(self) -> int: ...
 
 class Architecture:
     def __init__(
@@ -285,6 +331,7 @@ class Editor:
         progress: Progress = None,
     ) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"], EditReport]: ...
 
+def blas_name() -> str: ...
 def closest_rotations(
     jacobians: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 9]"],
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]: ...
@@ -303,6 +350,7 @@ def eigenbasis(
     vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
     faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
     count: typing.SupportsInt | typing.SupportsIndex,
+    method: str = "automatic",
     progress: Progress = None,
 ) -> tuple[
     typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"],
@@ -323,6 +371,13 @@ def flipped_faces(
     faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
     posed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
 ) -> int: ...
+def functional_map(
+    source: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    source_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    target: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    target_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    point_map: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
 def gradient(
     vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
     faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
@@ -336,6 +391,11 @@ def lumped_mass(
     vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
     faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+def nearest_rows(
+    queries: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    progress: Progress = None,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
 def network_forward(
     prepared: PreparedMesh,
     network: Network,
@@ -347,17 +407,28 @@ def network_gradient(
     rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 9]"],
     grad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 9]"],
 ) -> dict[str, typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]"]]: ...
+def point_map(
+    source: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    source_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    target: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    target_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    functional_map: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    progress: Progress = None,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
 def pose_error(
     rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
     faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
     posed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
     truth: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
 ) -> float: ...
+def set_thread_count(count: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+def simd_level() -> str: ...
 def symmetric_dirichlet(
     rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
     faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
     posed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
 ) -> float: ...
+def thread_count() -> int: ...
 def train(
     pairs: collections.abc.Sequence[TrainingPair],
     options: TrainOptions,
@@ -372,5 +443,19 @@ def train_double(
     on_step: typing.Any = None,
     progress: Progress = None,
 ) -> dict: ...
+def zoomout(
+    source: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    source_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    target: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    target_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    point_map: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+    start: typing.SupportsInt | typing.SupportsIndex,
+    end: typing.SupportsInt | typing.SupportsIndex,
+    step: typing.SupportsInt | typing.SupportsIndex,
+    progress: Progress = None,
+) -> tuple[
+    typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"],
+    typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"],
+]: ...
 
 __version__: str

@@ -25,6 +25,30 @@ def points(value: ArrayLike, name: str = "vertices") -> NDArray[np.float64]:
     return np.ascontiguousarray(array, dtype=np.float64)
 
 
+def rows(value: ArrayLike, name: str) -> NDArray[np.float64]:
+    """(n, k) float64, C order. Errors: wrong_shape."""
+    array = _array(value, name)
+    if array.ndim != 2:
+        raise SuppleError("wrong_shape", f"{name} has shape {array.shape}; it must be (n, k).")
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def numbers(value: ArrayLike, name: str) -> NDArray[np.float64]:
+    """(n,) float64. Errors: wrong_shape."""
+    array = _array(value, name)
+    if array.ndim != 1:
+        raise SuppleError("wrong_shape", f"{name} has shape {array.shape}; it must be a list.")
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def matrices(value: ArrayLike, name: str) -> NDArray[np.float64]:
+    """(m, 9) float64 of (m, 3, 3) matrices. Errors: wrong_shape."""
+    array = _array(value, name)
+    if array.ndim != 3 or array.shape[1:] != (3, 3):
+        raise SuppleError("wrong_shape", f"{name} has shape {array.shape}; it must be (m, 3, 3).")
+    return np.ascontiguousarray(array.reshape(-1, 9), dtype=np.float64)
+
+
 def triangles(value: ArrayLike, name: str = "faces") -> NDArray[np.int32]:
     """(m, 3) int32, C order. Errors: wrong_shape, also for indices that are not whole numbers."""
     array = _array(value, name)

@@ -140,7 +140,8 @@ struct CholmodSymbolic::Impl {
   double work = 0.0;  // floating-point operations of a factorisation
 };
 
-CholmodSymbolic::CholmodSymbolic(const SparseMatrix& pattern, const Eigen::VectorXi& ordering)
+CholmodSymbolic::CholmodSymbolic(const SparseMatrix& pattern, const Eigen::VectorXi& ordering,
+                                 CholeskyOrdering method)
     : impl_(std::make_unique<Impl>()) {
   Session session;
   cholmod_sparse matrix = view(pattern);
@@ -150,9 +151,17 @@ CholmodSymbolic::CholmodSymbolic(const SparseMatrix& pattern, const Eigen::Vecto
     Eigen::VectorXi given = ordering;  // CHOLMOD takes it writable
     impl_->analysis.reset(cholmod_analyze_p(&matrix, given.data(), nullptr, 0, &session.common));
   } else {
+    if (method != CholeskyOrdering::automatic) {
+      session.common.nmethods = 1;
+      session.common.method[0].ordering =
+          method == CholeskyOrdering::amd ? CHOLMOD_AMD : CHOLMOD_METIS;
+    }
     impl_->analysis.reset(cholmod_analyze(&matrix, &session.common));
   }
   check_memory(session);
+  if (session.common.status == CHOLMOD_NOT_INSTALLED) {
+    throw Error(ErrorCode::bad_option, "This CHOLMOD was built without METIS. Use 'amd'.");
+  }
   if (impl_->analysis == nullptr) {
     throw_not_definite(pattern.rows());
   }

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "supple/core/types.h"
+#include "supple/geometry/sparse_cholesky.h"
 
 namespace supple {
 
@@ -24,7 +25,9 @@ class Factor {
 /// CHOLMOD's analysis of a pattern; makes its factors.
 class CholmodSymbolic {
  public:
-  CholmodSymbolic(const SparseMatrix& pattern, const Eigen::VectorXi& ordering);
+  /// method: how to look for an ordering where `ordering` is empty.
+  CholmodSymbolic(const SparseMatrix& pattern, const Eigen::VectorXi& ordering,
+                  CholeskyOrdering method);
   ~CholmodSymbolic();
   Eigen::VectorXi ordering() const;
   std::unique_ptr<const Factor> factor(const SparseMatrix& matrix) const;

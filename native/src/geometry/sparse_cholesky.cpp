@@ -3,6 +3,8 @@
 
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "factor.h"
@@ -69,6 +71,54 @@ void check_ordering(const Eigen::VectorXi& ordering, Eigen::Index n) {
 
 }  // namespace
 
+CholeskyBackend cholesky_backend(const std::string& name) {
+  if (name == "cholmod") {
+    return CholeskyBackend::cholmod;
+  }
+  if (name == "eigen") {
+    return CholeskyBackend::eigen;
+  }
+  throw Error(ErrorCode::bad_option,
+              "There is no Cholesky backend '" + name + "'. Use 'cholmod' or 'eigen'.");
+}
+
+CholeskyOrdering cholesky_ordering(const std::string& name) {
+  if (name == "automatic") {
+    return CholeskyOrdering::automatic;
+  }
+  if (name == "amd") {
+    return CholeskyOrdering::amd;
+  }
+  if (name == "metis") {
+    return CholeskyOrdering::metis;
+  }
+  throw Error(ErrorCode::bad_option,
+              "There is no ordering '" + name + "'. Use 'automatic', 'amd' or 'metis'.");
+}
+
+void check_symmetric(const SparseMatrix& matrix) {
+  check_square(matrix);
+  const SparseMatrix mirrored = matrix.transpose();
+  const SparseMatrix away = matrix - mirrored;
+  double largest = 0.0;
+  for (int c = 0; c < matrix.outerSize(); ++c) {
+    for (SparseMatrix::InnerIterator it(matrix, c); it; ++it) {
+      largest = std::max(largest, std::abs(it.value()));
+    }
+  }
+  for (int c = 0; c < away.outerSize(); ++c) {
+    for (SparseMatrix::InnerIterator it(away, c); it; ++it) {
+      if (std::abs(it.value()) > 1e-10 * largest) {
+        const std::string row = std::to_string(it.row()), column = std::to_string(it.col());
+        throw Error(ErrorCode::not_positive_definite,
+                    "The system is not symmetric: entry (" + row + ", " + column +
+                        ") differs from entry (" + column + ", " + row +
+                        "). Pass both triangles of a symmetric matrix.");
+      }
+    }
+  }
+}
+
 void throw_not_definite(Eigen::Index n) {
   throw Error(ErrorCode::not_positive_definite,
               "The " + std::to_string(n) + " x " + std::to_string(n) +
@@ -103,9 +153,23 @@ SymbolicCholesky::Backend SymbolicCholesky::default_backend() {
 
 SymbolicCholesky::SymbolicCholesky(const SparseMatrix& pattern, Backend backend,
                                    const Eigen::VectorXi& ordering) {
+  analyse(pattern, backend, ordering, CholeskyOrdering::automatic);
+}
+
+SymbolicCholesky::SymbolicCholesky(const SparseMatrix& pattern, Backend backend,
+                                   CholeskyOrdering method) {
+  analyse(pattern, backend, {}, method);
+}
+
+void SymbolicCholesky::analyse(const SparseMatrix& pattern, Backend backend,
+                               const Eigen::VectorXi& ordering, CholeskyOrdering method) {
   if (!available(backend)) {
     throw Error(ErrorCode::bad_option,
                 "This build has no CHOLMOD. Use the Eigen backend or build with SuiteSparse.");
+  }
+  if (backend == Backend::eigen && method == CholeskyOrdering::metis) {
+    throw Error(ErrorCode::bad_option,
+                "The Eigen backend has no METIS. Use 'amd' or 'automatic', or CHOLMOD.");
   }
   check_square(pattern);
   if (ordering.size() > 0) {
@@ -119,7 +183,7 @@ SymbolicCholesky::SymbolicCholesky(const SparseMatrix& pattern, Backend backend,
   if (pattern.nonZeros() > 0) {  // CHOLMOD cannot be shown an empty pattern
 #ifdef SUPPLE_WITH_CHOLMOD
     if (backend == Backend::cholmod) {
-      impl->cholmod = std::make_unique<const CholmodSymbolic>(pattern, ordering);
+      impl->cholmod = std::make_unique<const CholmodSymbolic>(pattern, ordering, method);
       impl->ordering = impl->cholmod->ordering();
     }
 #endif
@@ -172,6 +236,7 @@ SparseCholesky& SparseCholesky::operator=(SparseCholesky&&) noexcept = default;
 
 Eigen::Index SparseCholesky::size() const { return impl_->symbolic->size(); }
 SparseCholesky::Backend SparseCholesky::backend() const { return impl_->symbolic->backend(); }
+const SymbolicCholesky& SparseCholesky::symbolic() const { return *impl_->symbolic; }
 Eigen::Index SparseCholesky::factor_entries() const {
   return impl_->factor == nullptr ? 0 : impl_->factor->entries();
 }

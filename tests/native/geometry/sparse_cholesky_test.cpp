@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "supple/geometry/sparse_cholesky.h"
 
+#include <memory>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -134,6 +136,53 @@ TEST(CholeskyBackends, GiveTheSameSolution) {
   const Eigen::MatrixXd a = SparseCholesky(matrix, Backend::cholmod).solve(rhs);
   const Eigen::MatrixXd b = SparseCholesky(matrix, Backend::eigen).solve(rhs);
   EXPECT_LT((a - b).norm(), 1e-11 * a.norm());
+}
+
+TEST(CholeskyOrderings, AllSolveAndEachFactorNamesItsOwn) {
+  const SparseMatrix matrix = definite(zoo::perturbed_sphere(3, 1));
+  const RowMatrix<double> rhs = test::noise(matrix.rows(), 3, 1);
+  const RowMatrix<double> expected = SparseCholesky(matrix).solve(rhs);
+  for (const Backend backend : {Backend::cholmod, Backend::eigen}) {
+    for (const char* name : {"automatic", "amd", "metis"}) {
+      const bool metis = name == std::string("metis");
+      if (!SparseCholesky::available(backend) || (backend == Backend::eigen && metis)) {
+        continue;
+      }
+      const auto symbolic =
+          std::make_shared<const SymbolicCholesky>(matrix, backend, cholesky_ordering(name));
+      const SparseCholesky factor(matrix, symbolic);
+      EXPECT_LT((factor.solve(rhs) - expected).norm(), 1e-11 * expected.norm()) << name;
+      EXPECT_EQ(&factor.symbolic(), symbolic.get());
+      // The ordering, given back, gives the same factor.
+      const SparseCholesky again(
+          matrix, std::make_shared<const SymbolicCholesky>(matrix, backend, symbolic->ordering()));
+      EXPECT_EQ(again.factor_entries(), factor.factor_entries()) << name;
+    }
+  }
+}
+
+TEST(CholeskyOrderings, ThoseThatAreNotThereAreNamed) {
+  const SparseMatrix matrix = sparse(Eigen::Matrix2d::Identity());
+  EXPECT_TRUE(test::fails_with(ErrorCode::bad_option, {"METIS", "'amd'"}, [&] {
+    SymbolicCholesky(matrix, Backend::eigen, CholeskyOrdering::metis);
+  }));
+  EXPECT_TRUE(test::fails_with(ErrorCode::bad_option, {"'best'", "'metis'"},
+                               [] { cholesky_ordering("best"); }));
+  EXPECT_TRUE(test::fails_with(ErrorCode::bad_option, {"'lapack'", "'eigen'"},
+                               [] { cholesky_backend("lapack"); }));
+  EXPECT_EQ(cholesky_backend("cholmod"), Backend::cholmod);
+}
+
+TEST(CholeskySymmetry, IsChecked) {
+  EXPECT_NO_THROW(check_symmetric(definite(zoo::torus(12, 8))));
+  const Eigen::Matrix2d skew = (Eigen::Matrix2d() << 4, 2, 2.1, 3).finished();
+  EXPECT_TRUE(test::fails_with(ErrorCode::not_positive_definite, {"not symmetric", "(1, 0)"},
+                               [&] { check_symmetric(sparse(skew)); }));
+  const Eigen::Matrix2d half = (Eigen::Matrix2d() << 4, 2, 0, 3).finished();
+  EXPECT_TRUE(test::fails_with(ErrorCode::not_positive_definite, {"both triangles"},
+                               [&] { check_symmetric(sparse(half)); }));
+  EXPECT_TRUE(test::fails_with(ErrorCode::wrong_shape, {"2 x 3"},
+                               [] { check_symmetric(SparseMatrix(2, 3)); }));
 }
 
 TEST(CholeskyBackends, EigenIsAlwaysThereAndTheDefaultIsAvailable) {

@@ -102,7 +102,8 @@ def _arap(iterations: int | None):
 
 
 def _map_inputs(case: Case):
-    """Two shapes, their eigenfunctions and masses, and a coarse functional map between them."""
+    """Two shapes, their eigenfunctions and masses, and a coarse functional map between them: that
+    of every vertex to itself, which ours is given as it is."""
     other = bent(case.vertices)
     bases, masses = [], []
     for vertices in (case.vertices, other):
@@ -125,11 +126,15 @@ def _map_facts(count: int):
 
 def _zoomout(case: Case, _: int) -> Ready:
     zoomout = attribute("supple.spectral.zoomout")
-    bases, masses, start = _map_inputs(case)
-    return Ready(
-        lambda: zoomout(start, bases[0], bases[1], masses[1], step=REFINE_STEP),
-        _map_facts(len(case.vertices)),
-    )
+    bases, masses, _ = _map_inputs(case)
+    target, source = zip(bases, masses, strict=True)
+    same = np.arange(len(case.vertices))
+
+    def call():
+        refined = zoomout(source, target, same, start=REFINE_FROM, end=REFINE_TO, step=REFINE_STEP)
+        return refined[::-1]  # the functional map first, as pyFM has it
+
+    return Ready(call, _map_facts(len(case.vertices)))
 
 
 def _pyfm(case: Case, threads: int) -> Ready:

@@ -58,11 +58,11 @@ def _eigenbasis(case: Case, _: int) -> Ready:
     return Ready(lambda: run(case.vertices, case.faces, EIGENFUNCTIONS), _eigen_facts(case))
 
 
-def _spectra(case: Case, _: int) -> Ready:
+def _lanczos(case: Case, _: int) -> Ready:
     run = attribute("supple.geometry.eigenbasis")
     accepts(run, "method", "supple.geometry.eigenbasis")
     return Ready(
-        lambda: run(case.vertices, case.faces, EIGENFUNCTIONS, method="spectra"),
+        lambda: run(case.vertices, case.faces, EIGENFUNCTIONS, method="lanczos"),
         _eigen_facts(case),
     )
 
@@ -144,15 +144,15 @@ def _cholespy_factor(matrix):
     return solve
 
 
-def _native_factor(backend: str | None):
+def _native_factor(ordering: str | None):
     def factor(matrix):
         cholesky = attribute("supple.geometry.SparseCholesky")
-        if backend is None:
+        if ordering is None:
             return cholesky(matrix).solve
         try:
-            return cholesky(matrix, backend=backend).solve
+            return cholesky(matrix, ordering=ordering).solve
         except (TypeError, SuppleError) as error:
-            raise NotAvailable("supple.geometry.SparseCholesky(backend=)") from error
+            raise NotAvailable("supple.geometry.SparseCholesky(ordering=)") from error
 
     return factor
 
@@ -222,7 +222,7 @@ TASKS = (
             Contender("supple", _eigenbasis, ours=True),
             Contender("SciPy eigsh", _eigsh(factored=False)),
             Contender("SciPy eigsh, CHOLMOD inside", _eigsh(factored=True)),
-            Contender("Spectra", _spectra),
+            Contender("Spectra", _lanczos),
         ),
     ),
     Task(
@@ -231,7 +231,7 @@ TASKS = (
         (
             Contender("supple", _factoring(_native_factor(None)), ours=True),
             Contender("CHOLMOD (cholespy)", _factoring(_cholespy_factor)),
-            Contender("CHOLMOD supernodal, METIS", _factoring(_native_factor("cholmod_metis"))),
+            Contender("CHOLMOD supernodal, METIS", _factoring(_native_factor("metis"))),
         ),
     ),
     Task(
@@ -240,7 +240,7 @@ TASKS = (
         (
             Contender("supple", _solving(_native_factor(None)), ours=True),
             Contender("CHOLMOD (cholespy)", _solving(_cholespy_factor)),
-            Contender("CHOLMOD supernodal, METIS", _solving(_native_factor("cholmod_metis"))),
+            Contender("CHOLMOD supernodal, METIS", _solving(_native_factor("metis"))),
         ),
     ),
     Task(

@@ -90,6 +90,7 @@ class Worker:
         paths += [str(TRAINING), *filter(None, [os.environ.get("PYTHONPATH")])]
         env = {
             **os.environ,
+            "SUPPLE_CACHE": "0",  # what is prepared is computed, not found on disk
             "PYTHONPATH": os.pathsep.join(paths),
             **dict.fromkeys(
                 ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), threads

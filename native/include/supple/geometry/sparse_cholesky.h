@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "supple/core/types.h"
 
@@ -12,6 +13,16 @@ enum class CholeskyBackend {
   cholmod,  ///< CHOLMOD, supernodal; the default where it was built in
   eigen,    ///< Eigen's SimplicialLDLT, always there
 };
+
+/// How a fill-reducing ordering is looked for.
+enum class CholeskyOrdering {
+  automatic,  ///< AMD, and METIS where AMD leaves much fill; with Eigen, AMD
+  amd,        ///< approximate minimum degree (Amestoy, Davis and Duff 1996)
+  metis,      ///< nested dissection (Karypis and Kumar 1998); CHOLMOD alone
+};
+/// Errors of both: `bad_option` for any other name.
+CholeskyBackend cholesky_backend(const std::string& name);
+CholeskyOrdering cholesky_ordering(const std::string& name);
 
 /// What factoring needs to know of a matrix's pattern: a fill-reducing ordering, the elimination
 /// tree, the supernodes. Found once a connectivity and shared by every matrix that has its pattern.
@@ -27,6 +38,9 @@ class SymbolicCholesky {
   /// permutation.
   explicit SymbolicCholesky(const SparseMatrix& pattern, Backend backend = default_backend(),
                             const Eigen::VectorXi& ordering = {});
+  /// The same with an ordering that is looked for as `method` says. Errors: also `bad_option` where
+  /// the backend has no such method.
+  SymbolicCholesky(const SparseMatrix& pattern, Backend backend, CholeskyOrdering method);
   ~SymbolicCholesky();
 
   static bool available(Backend backend);
@@ -40,8 +54,15 @@ class SymbolicCholesky {
  private:
   friend class SparseCholesky;
   struct Impl;
+  void analyse(const SparseMatrix& pattern, Backend backend, const Eigen::VectorXi& ordering,
+               CholeskyOrdering method);
   std::unique_ptr<const Impl> impl_;
 };
+
+/// For matrices from outside, of which a factorisation would read one triangle without a word.
+/// Errors: `wrong_shape` if not square; `not_positive_definite` naming the first entry that differs
+/// from its mirror image by more than 1e-10 of the largest of all.
+void check_symmetric(const SparseMatrix& matrix);
 
 /// Factorisation of a sparse symmetric positive definite matrix, made once and solved with often.
 /// With `SymbolicCholesky`, the only place that knows which library does it. Immutable: safe to use
@@ -65,6 +86,8 @@ class SparseCholesky {
 
   Eigen::Index size() const;
   Backend backend() const;
+  /// The analysis it was made with.
+  const SymbolicCholesky& symbolic() const;
   /// Entries of the factor, a measure of memory and of the time of a solve.
   Eigen::Index factor_entries() const;
   /// n x c right-hand sides to n x c solutions; columns are shared among the threads.
