@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the libraries under the native module read from the environment when they load."""
+"""Sets what the libraries under the native module read from the environment when they load.
+
+On import, because it has to come before the native module's.
+"""
 
 import os
 import re
@@ -21,8 +24,7 @@ def _kernels() -> str | None:
     return None
 
 
-def prepare() -> None:
-    """Set what is not set yet."""
+def _prepare() -> None:
     # OpenMP's threads spin between loops unless told to sleep, and beside a busy Blender that costs
     # far more than waking them (measured 17 times on 2 cores).
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
@@ -30,3 +32,6 @@ def prepare() -> None:
     # than itself (measured 3 to 6 times slower). What a processor can do is in its flags.
     if "OPENBLAS_CORETYPE" not in os.environ and (kernels := _kernels()):
         os.environ["OPENBLAS_CORETYPE"] = kernels
+
+
+_prepare()

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 
+#include "supple/core/simd.h"
 #include "supple/core/tall.h"
 
 namespace supple::equivariant {
@@ -100,40 +101,165 @@ class Bands {
   RowMatrix<Scalar> values_;
 };
 
+// 3x3 matrices as nine numbers, in loops that compile for any instruction set.
 template <class Scalar>
-void combine(const Bands<Scalar>& bands, Eigen::Index r, const Scalar* c,
-             const Reference<Scalar>& reference, Combination<Scalar>& out) {
-  const Layout layout{bands.fields()};
-  out = {};
-  Scalar sum(0), normal_sum(0);
-  for (int i = 0; i < layout.fields; ++i) {
-    // sum_s c_s Y_s = sum over bands b of (sum_{s >= b} c_s) Z_b.
-    Scalar plain(0), normal(0);
-    for (int s = kScaleCount - 1; s >= 0; --s) {
-      plain += c[layout.smooth(i, s)];
-      normal += c[layout.smooth(i, s) + 1];
-      const Scalar* const z = bands.at(r, i, s);
-      for (Eigen::Index e = 0; e < kPadded; ++e) {
-        out.along[e] += plain * z[e];
-        out.normal[e] += normal * z[e];
-      }
+SUPPLE_INLINE void multiply(const Scalar* a, const Scalar* b, Scalar* out) {
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      out[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
     }
-    sum += plain;
-    normal_sum += normal;
-  }
-  Mat3<Scalar> smooth = Mat3<Scalar>::Zero(), defect = Mat3<Scalar>::Zero();
-  for (int s = 0; s < kScaleCount; ++s) {
-    smooth += matrix_of(bands.at(r, layout.fields - 1, s));
-    defect += c[layout.defect(s)] * defect_of(reference, smooth);
-  }
-  Eigen::Map<Mat3<Scalar>>(out.defect) = defect;
-  out.along[kSum] = sum;
-  out.along[kNormalSum] = normal_sum;
-  if (layout.fields > 1) {
-    out.along[kFirst] = c[layout.plain(0)];
-    out.along[kNormalFirst] = c[layout.plain(0) + 1];
   }
 }
+
+// What each thread reads and writes.
+template <class Scalar>
+struct CombineTask {
+  Layout layout;
+  const Scalar* bands;  // rows x (kScaleCount * fields * kPadded)
+  const Scalar* c;      // rows x outputs
+  Eigen::Index rows, outputs;
+  Scalar reference[9], defect[9];  // C, C C^T - I
+  Combination<Scalar>* out;
+};
+
+template <class Scalar>
+SUPPLE_INLINE void combine_body(const CombineTask<Scalar>& task) {
+  const int fields = task.layout.fields;
+  for (Eigen::Index r = 0; r < task.rows; ++r) {
+    const Scalar* const bands = task.bands + r * kScaleCount * fields * kPadded;
+    const Scalar* const c = task.c + r * task.outputs;
+    Scalar along[kPadded] = {}, across[kPadded] = {};
+    Scalar sum(0), normal_sum(0);
+    for (int i = 0; i < fields; ++i) {
+      // sum_s c_s Y_s = sum over bands b of (sum_{s >= b} c_s) Z_b.
+      Scalar plain(0), normal(0);
+      for (int s = kScaleCount - 1; s >= 0; --s) {
+        plain += c[task.layout.smooth(i, s)];
+        normal += c[task.layout.smooth(i, s) + 1];
+        const Scalar* const z = bands + (s * fields + i) * kPadded;
+        for (Eigen::Index e = 0; e < kPadded; ++e) {
+          along[e] += plain * z[e];
+          across[e] += normal * z[e];
+        }
+      }
+      sum += plain;
+      normal_sum += normal;
+    }
+    // Y Y^T - I = (C C^T - I) + (C e^T + e C^T) + e e^T: the middle is linear in e, so its sum is
+    // that of the weighted e; only e e^T, symmetric, is summed scale by scale.
+    Scalar smooth[9] = {}, weighted[9] = {}, square[6] = {}, total(0);
+    for (int s = 0; s < kScaleCount; ++s) {
+      const Scalar* const z = bands + (s * fields + fields - 1) * kPadded;
+      const Scalar d = c[task.layout.defect(s)];
+      total += d;
+      for (int e = 0; e < 9; ++e) {
+        smooth[e] += z[e];
+        weighted[e] += d * smooth[e];
+      }
+      const Scalar *const u = smooth, *const v = smooth + 3, *const w = smooth + 6;
+      square[0] += d * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+      square[1] += d * (u[0] * v[0] + u[1] * v[1] + u[2] * v[2]);
+      square[2] += d * (u[0] * w[0] + u[1] * w[1] + u[2] * w[2]);
+      square[3] += d * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+      square[4] += d * (v[0] * w[0] + v[1] * w[1] + v[2] * w[2]);
+      square[5] += d * (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+    }
+    Combination<Scalar>& out = task.out[r];
+    constexpr int kSymmetric[9] = {0, 1, 2, 1, 3, 4, 2, 4, 5};
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        Scalar mixed(0);
+        for (int e = 0; e < 3; ++e) {
+          mixed += task.reference[3 * i + e] * weighted[3 * j + e] +
+                   weighted[3 * i + e] * task.reference[3 * j + e];
+        }
+        out.defect[3 * i + j] =
+            total * task.defect[3 * i + j] + mixed + square[kSymmetric[3 * i + j]];
+      }
+    }
+    for (Eigen::Index e = 9; e < kPadded; ++e) {
+      out.defect[e] = Scalar(0);
+    }
+    for (Eigen::Index e = 0; e < kPadded; ++e) {
+      out.along[e] = along[e];
+      out.normal[e] = across[e];
+    }
+    out.along[kSum] = sum;
+    out.along[kNormalSum] = normal_sum;
+    out.along[kFirst] = fields > 1 ? c[task.layout.plain(0)] : Scalar(0);
+    out.along[kNormalFirst] = fields > 1 ? c[task.layout.plain(0) + 1] : Scalar(0);
+  }
+}
+
+template <class Scalar>
+struct FaceTask {
+  const int* faces;       // m x 3
+  const double* lead;     // m x 9, L
+  const double* first;    // m x 9, X_0
+  const double* normals;  // m x 3
+  double reference[9];
+  const Combination<Scalar>* at_vertices;
+  double* out;  // m x 9
+};
+
+template <class Scalar>
+SUPPLE_INLINE void correct_body(const FaceTask<Scalar>& task, Eigen::Index begin,
+                                Eigen::Index end) {
+  for (Eigen::Index f = begin; f < end; ++f) {
+    const Combination<Scalar>& a = task.at_vertices[task.faces[3 * f]];
+    const Combination<Scalar>& b = task.at_vertices[task.faces[3 * f + 1]];
+    const Combination<Scalar>& c = task.at_vertices[task.faces[3 * f + 2]];
+    Scalar along[kPadded], across[kPadded], defect[kPadded];
+    for (Eigen::Index e = 0; e < kPadded; ++e) {
+      along[e] = (a.along[e] + b.along[e] + c.along[e]) * Scalar(1.0 / 3.0);
+      across[e] = (a.normal[e] + b.normal[e] + c.normal[e]) * Scalar(1.0 / 3.0);
+      defect[e] = (a.defect[e] + b.defect[e] + c.defect[e]) * Scalar(1.0 / 3.0);
+    }
+    const double *const lead = task.lead + 9 * f, *const first = task.first + 9 * f;
+    Scalar whole[9], bent[9], correction[9];
+    for (int e = 0; e < 9; ++e) {
+      whole[e] = static_cast<Scalar>(lead[e]);
+      const auto moved = static_cast<Scalar>(lead[e] - task.reference[e]);
+      const auto other = static_cast<Scalar>(first[e] - lead[e]);
+      along[e] += along[kFirst] * other - along[kSum] * moved;
+      across[e] += along[kNormalFirst] * other - along[kNormalSum] * moved;
+    }
+    multiply(defect, whole, bent);
+    Scalar normal[3], through[3];
+    for (int e = 0; e < 3; ++e) {
+      normal[e] = static_cast<Scalar>(task.normals[3 * f + e]);
+    }
+    for (int j = 0; j < 3; ++j) {
+      through[j] = normal[0] * across[j] + normal[1] * across[3 + j] + normal[2] * across[6 + j];
+    }
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        correction[3 * i + j] = along[3 * i + j] + bent[3 * i + j] + normal[i] * through[j];
+      }
+    }
+    for (int e = 0; e < 9; ++e) {
+      task.out[9 * f + e] = lead[e] + static_cast<double>(correction[e]);
+    }
+  }
+}
+
+template <class Scalar>
+struct Kernels {
+  SUPPLE_AVX512 static void combine_avx512(const CombineTask<Scalar>& task) { combine_body(task); }
+  SUPPLE_AVX2 static void combine_avx2(const CombineTask<Scalar>& task) { combine_body(task); }
+  static void combine_plain(const CombineTask<Scalar>& task) { combine_body(task); }
+  SUPPLE_AVX512 static void correct_avx512(const FaceTask<Scalar>& task, Eigen::Index begin,
+                                           Eigen::Index end) {
+    correct_body(task, begin, end);
+  }
+  SUPPLE_AVX2 static void correct_avx2(const FaceTask<Scalar>& task, Eigen::Index begin,
+                                       Eigen::Index end) {
+    correct_body(task, begin, end);
+  }
+  static void correct_plain(const FaceTask<Scalar>& task, Eigen::Index begin, Eigen::Index end) {
+    correct_body(task, begin, end);
+  }
+};
 
 // Gradient with respect to the output's coefficients at one vertex.
 template <class Scalar>
@@ -274,41 +400,36 @@ MatrixField correct_faces(const NetworkContext<Scalar>& context, const Fields<Sc
   const SurfaceOperators& operators = *context.operators;
   const Reference<Scalar> reference(fields.reference);
   std::vector<Combination<Scalar>> at_vertices(static_cast<size_t>(operators.vertices.rows()));
-  for_each_chunk(context, fields,
-                 [&](const Bands<Scalar>& bands, Eigen::Index first, Eigen::Index rows) {
-                   RowMatrix<Scalar> c = RowMatrix<Scalar>::Zero(rows, outputs.cols());
-                   add_tall_product<Scalar>(Scalar(1), {context.functions.middleRows(first, rows)},
-                                            outputs, c);
-                   for (Eigen::Index r = 0; r < rows; ++r) {
-                     combine(bands, r, c.row(r).data(), reference,
-                             at_vertices[static_cast<size_t>(first + r)]);
-                   }
-                 });
+  const auto combine = best_kernel(&Kernels<Scalar>::combine_avx512, &Kernels<Scalar>::combine_avx2,
+                                   &Kernels<Scalar>::combine_plain);
+  for_each_chunk(
+      context, fields, [&](const Bands<Scalar>& bands, Eigen::Index first, Eigen::Index rows) {
+        RowMatrix<Scalar> c = RowMatrix<Scalar>::Zero(rows, outputs.cols());
+        add_tall_product<Scalar>(Scalar(1), {context.functions.middleRows(first, rows)}, outputs,
+                                 c);
+        CombineTask<Scalar> task{
+            {bands.fields()},          bands.at(0, 0, 0), c.data(), rows, outputs.cols(), {}, {},
+            at_vertices.data() + first};
+        std::copy_n(reference.matrix.data(), 9, task.reference);
+        std::copy_n(reference.defect.data(), 9, task.defect);
+        combine(task);
+      });
 
-  MatrixField result(operators.faces.rows(), 9);
-  const bool two = fields.signal->fields.size() > 1;
+  const Eigen::Index m = operators.faces.rows();
+  MatrixField result(m, 9);
+  FaceTask<Scalar> task{operators.faces.data(),
+                        fields.signal->fields.back().data(),
+                        fields.signal->fields.front().data(),
+                        operators.face_normals.data(),
+                        {},
+                        at_vertices.data(),
+                        result.data()};
+  std::copy_n(fields.reference.data(), 9, task.reference);
+  const auto correct = best_kernel(&Kernels<Scalar>::correct_avx512, &Kernels<Scalar>::correct_avx2,
+                                   &Kernels<Scalar>::correct_plain);
 #pragma omp parallel for schedule(static)
-  for (Eigen::Index f = 0; f < operators.faces.rows(); ++f) {
-    Combination<Scalar> c = {};
-    for (int corner = 0; corner < 3; ++corner) {
-      const auto& at = at_vertices[static_cast<size_t>(operators.faces(f, corner))];
-      for (Eigen::Index e = 0; e < kPadded; ++e) {
-        c.along[e] += Scalar(1.0 / 3.0) * at.along[e];
-        c.normal[e] += Scalar(1.0 / 3.0) * at.normal[e];
-        c.defect[e] += Scalar(1.0 / 3.0) * at.defect[e];
-      }
-    }
-    const Face<Scalar> face = face_at(context, fields, f);
-    Mat3<Scalar> correction = matrix_of(c.along) - c.along[kSum] * face.lead;
-    Mat3<Scalar> normal = matrix_of(c.normal) - c.along[kNormalSum] * face.lead;
-    if (two) {
-      correction += c.along[kFirst] * face.first;
-      normal += c.along[kNormalFirst] * face.first;
-    }
-    correction += face.normal.transpose() * (face.normal * normal);
-    correction += matrix_of(c.defect) * face.whole_lead;
-    matrix_at(result, f) =
-        matrix_at(fields.signal->fields.back(), f) + correction.template cast<double>();
+  for (Eigen::Index begin = 0; begin < m; begin += kChunk) {
+    correct(task, begin, std::min(begin + kChunk, m));
   }
   return result;
 }
