@@ -201,7 +201,8 @@ TEST(EigenbasisErrors, NoFunctionsAskedFor) {
 TEST(EigenbasisErrors, TooFewIterationsAreReported) {
   const SurfaceOperators operators = operators_of(zoo::perturbed_sphere(3, 7));
   EXPECT_TRUE(test::fails_with(ErrorCode::no_convergence, {"residual"}, [&] {
-    eigenbasis(operators.laplacian, operators.mass, {.count = 100, .max_iterations = 0});
+    eigenbasis(operators.laplacian, operators.mass,
+               {.count = 100, .method = EigenMethod::lanczos, .max_restarts = 0});
   }));
 }
 
