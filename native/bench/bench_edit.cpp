@@ -2,40 +2,16 @@
 // What an edit costs, by number of vertices: preparing, binding handles, one warm solve.
 #include <benchmark/benchmark.h>
 
-#include <cmath>
 #include <memory>
-#include <numbers>
 
+#include "bumpy_torus.h"
 #include "supple/tasks/edit.h"
 
 namespace supple {
 namespace {
 
-struct Shape {
-  Points vertices;
-  Faces faces;
-};
-
-// A bumpy torus of about `count` vertices: curved, closed, without symmetry that a solver could
-// use.
-Shape bumpy_torus(int count) {
-  const int along = static_cast<int>(std::sqrt(count * 2.5)), around = count / along;
-  Shape shape{Points(along * around, 3), Faces(2 * along * around, 3)};
-  for (int i = 0; i < along; ++i) {
-    for (int j = 0; j < around; ++j) {
-      const double u = 2.0 * std::numbers::pi * i / along, v = 2.0 * std::numbers::pi * j / around;
-      const double r = 0.3 * (1.0 + 0.2 * std::sin(3.0 * u + 0.3) * std::cos(2.0 * v));
-      const double ring = 1.0 + r * std::cos(v);
-      shape.vertices.row(i * around + j) << ring * std::cos(u), ring * std::sin(u), r * std::sin(v);
-      const int a = i * around + j, b = ((i + 1) % along) * around + j;
-      const int c = ((i + 1) % along) * around + (j + 1) % around,
-                d = i * around + (j + 1) % around;
-      shape.faces.row(2 * a) << a, b, c;
-      shape.faces.row(2 * a + 1) << a, c, d;
-    }
-  }
-  return shape;
-}
+using bench::bumpy_torus;
+using bench::Shape;
 
 struct Bound {
   std::unique_ptr<Editor> editor;

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "native/support.h"
 
+#include <omp.h>
+
 #include <Eigen/Geometry>
 #include <cmath>
+#include <cstdlib>
 #include <random>
+
+#include "supple/core/simd.h"
 
 namespace supple::test {
 
@@ -64,5 +69,35 @@ double farthest(const Points& a, const Points& b) { return (a - b).rowwise().nor
   }
   return ::testing::AssertionFailure() << "expected " << to_string(code) << ", nothing was thrown";
 }
+
+void at_every_simd_level(const std::function<void()>& check) {
+  const char* const before = std::getenv("SUPPLE_SIMD");
+  const std::string kept = before == nullptr ? "" : before;
+  // A new process, not only a fork: the level is read once, and OpenMP's threads do not survive
+  // one.
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  for (const SimdLevel level : {SimdLevel::plain, SimdLevel::avx2, SimdLevel::avx512}) {
+    setenv("SUPPLE_SIMD", to_string(level), 1);
+    EXPECT_EXIT(
+        {
+          if (simd_level() == level) {
+            check();
+          } else {
+            EXPECT_LT(simd_level(), level);
+          }
+          std::exit(::testing::Test::HasFailure() ? 1 : 0);
+        },
+        ::testing::ExitedWithCode(0), "")
+        << to_string(level);
+  }
+  if (before == nullptr) {
+    unsetenv("SUPPLE_SIMD");
+  } else {
+    setenv("SUPPLE_SIMD", kept.c_str(), 1);
+  }
+}
+
+Threads::Threads(int count) : before_(omp_get_max_threads()) { omp_set_num_threads(count); }
+Threads::~Threads() { omp_set_num_threads(before_); }
 
 }  // namespace supple::test

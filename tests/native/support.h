@@ -41,6 +41,22 @@ double farthest(const Points& a, const Points& b);
 ::testing::AssertionResult fails_with(ErrorCode code, std::initializer_list<const char*> parts,
                                       const std::function<void()>& call);
 
+/// Runs `check` once for each instruction set that has kernels of its own, each in a new process
+/// that reads SUPPLE_SIMD afresh; sets this machine lacks are left out. Fails where a `check` does.
+void at_every_simd_level(const std::function<void()>& check);
+
+/// OpenMP's number of threads for a scope.
+class Threads {
+ public:
+  explicit Threads(int count);
+  ~Threads();
+  Threads(const Threads&) = delete;
+  Threads& operator=(const Threads&) = delete;
+
+ private:
+  int before_;
+};
+
 /// Name of a zoo entry, for INSTANTIATE_TEST_SUITE_P.
 inline std::string entry_name(const ::testing::TestParamInfo<zoo::Entry>& info) {
   return info.param.name;

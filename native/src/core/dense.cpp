@@ -68,6 +68,14 @@ Eigen::VectorXd symmetric_eigen(Eigen::MatrixXd& matrix) {
   if (n == 0) {
     return values;
   }
+  const auto fail = [&] {
+    throw Error(ErrorCode::no_convergence,
+                "The eigenvalues of a " + std::to_string(n) + " x " + std::to_string(n) +
+                    " matrix did not converge. Its numbers are not finite or far too large.");
+  };
+  if (!matrix.allFinite()) {
+    fail();  // LAPACK may return NaN and report success
+  }
   int info = 0, wanted_integers = 0;
   const int ask = -1;
   double wanted = 0.0;
@@ -80,9 +88,7 @@ Eigen::VectorXd symmetric_eigen(Eigen::MatrixXd& matrix) {
   dsyevd_("V", "L", &n, matrix.data(), &n, values.data(), work.data(), &work_size, integers.data(),
           &integer_size, &info);
   if (info != 0) {
-    throw Error(ErrorCode::no_convergence,
-                "The eigenvalues of a " + std::to_string(n) + " x " + std::to_string(n) +
-                    " matrix did not converge. Its numbers are not finite or far too large.");
+    fail();
   }
   return values;
 }

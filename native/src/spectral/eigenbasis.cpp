@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "block_krylov.h"
+#include "copies.h"
 #include "eigenproblem.h"
 #include "lanczos.h"
 #include "multiresolution.h"
@@ -51,67 +52,22 @@ Pairs dense_pairs(const SparseMatrix& symmetric, Eigen::Index count) {
   return {values.head(count), vectors.leftCols(count)};
 }
 
-// The pairs of both, ascending, the first `count` of them.
-Pairs merged(const Pairs& a, const Pairs& b, Eigen::Index count) {
-  Pairs result;
-  count = std::min(count, a.size() + b.size());
-  result.values.resize(count);
-  result.vectors.resize(a.vectors.rows(), count);
-  for (Eigen::Index i = 0, j = 0; i + j < count;) {
-    const Eigen::Index to = i + j;
-    if (j == b.size() || (i < a.size() && a.values[i] <= b.values[j])) {
-      result.values[to] = a.values[i];
-      result.vectors.col(to) = a.vectors.col(i++);
-    } else {
-      result.values[to] = b.values[j];
-      result.vectors.col(to) = b.vectors.col(j++);
-    }
-  }
-  return result;
-}
-
-// The most copies of one eigenvalue.
-Eigen::Index most_copies(const Eigen::VectorXd& values) {
-  Eigen::Index most = 0, first = 0;
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    if (values[i] - values[first] > kSame * std::max(values[i], 1.0)) {
-      first = i;
-    }
-    most = std::max(most, i - first + 1);
-  }
-  return most;
-}
-
-// All pairs but the kernel's. A block method finds as many copies of an eigenvalue as a block has
-// vectors, a single vector finds one by right and more by rounding: the rest is in the complement.
+// All pairs but the kernel's.
 Pairs krylov_pairs(const Eigenproblem& problem, Eigen::Index count,
                    const EigenbasisOptions& options, EigenMethod method,
                    const ProgressRange& progress) {
   const bool single = method == EigenMethod::lanczos;
-  const auto search = [&](const RowMatrix<double>& locked, Eigen::Index wanted, uint64_t seed) {
-    return single ? lanczos(problem, locked, wanted, options.max_restarts, progress)
-                  : block_krylov(problem, locked,
-                                 {.count = wanted,
-                                  .tolerance = 0.4 * options.residual,
-                                  .max_restarts = options.max_restarts,
-                                  .seed = seed},
-                                 progress);
-  };
-  Pairs found = search(RowMatrix<double>(problem.size(), 0), count, 1);
-  const Eigen::Index together = single ? 1 : block_width(count);
-  for (uint64_t seed = 2; found.size() < count || most_copies(found.values) >= together; ++seed) {
-    const Eigen::Index left = problem.size() - problem.kernel_size() - found.size();
-    if (left < 4 || seed > 40) {
-      break;
-    }
-    const Pairs more = search(found.vectors, std::min<Eigen::Index>(left / 4, 4), seed);
-    if (more.size() == 0 ||
-        (found.size() == count && more.values[0] >= found.values[count - 1] * (1.0 - kSame))) {
-      break;
-    }
-    found = merged(found, more, count);
-  }
-  return found;
+  return with_all_copies(problem, count, single ? 1 : block_width(count), kSame,
+                         [&](const RowMatrix<double>& locked, Eigen::Index wanted, uint64_t seed) {
+                           return single ? lanczos(problem, locked, wanted, options.max_restarts,
+                                                   progress)
+                                         : block_krylov(problem, locked,
+                                                        {.count = wanted,
+                                                         .tolerance = 0.4 * options.residual,
+                                                         .max_restarts = options.max_restarts,
+                                                         .seed = seed},
+                                                        progress);
+                         });
 }
 
 std::string advice() { return ". Remove slivers from the mesh or ask for fewer functions."; }
@@ -211,11 +167,18 @@ Eigenbasis eigenbasis(const SparseMatrix& laplacian, const Eigen::VectorXd& mass
     const ProgressRange work = progress.stage("eigenbasis", 0.05, 1.0);
     if (rest == 0) {
       pairs = constants;
-    } else if (basis.method == EigenMethod::multiresolution) {
-      pairs =
-          merged(constants, multiresolution(problem, rest, options.coarse_residual, work), count);
     } else {
-      pairs = merged(constants, krylov_pairs(problem, rest, options, basis.method, work), count);
+      Pairs others{Eigen::VectorXd(0), {}};
+      if (basis.method == EigenMethod::multiresolution) {
+        others = multiresolution(problem, rest, options.coarse_residual, work);
+        if (others.size() == 0) {
+          basis.method = EigenMethod::block_krylov;
+        }
+      }
+      if (basis.method != EigenMethod::multiresolution) {
+        others = krylov_pairs(problem, rest, options, basis.method, work);
+      }
+      pairs = merged(constants, others, count);
     }
   }
   if (pairs.size() < count) {

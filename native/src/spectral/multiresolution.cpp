@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "block_krylov.h"
+#include "copies.h"
 #include "supple/core/dense.h"
 #include "supple/core/tall.h"
 
@@ -15,7 +16,13 @@ namespace {
 
 // Coarsening stops at this many rows, where the exact method takes about a second.
 constexpr Eigen::Index kCoarseRows = 50000;
-constexpr int kMaxCorrections = 12;
+// A few are enough, but where the last wanted value and the first left out are near each other.
+constexpr int kMaxCorrections = 40;
+// Of the coarse functions, the lower part is near fine ones: the coarse space has to have this many
+// times the dimensions that are wanted.
+constexpr Eigen::Index kRoom = 4;
+// The coarse values' errors: copies of one eigenvalue can be so far apart.
+constexpr double kCoarseTolerance = 1e-3, kCoarseSame = 1e-2;
 
 // Each row's aggregate: first every row whose neighbours are all free gathers them, then the rest
 // joins a neighbour's. No aggregate crosses components.
@@ -148,17 +155,27 @@ Pairs multiresolution(const Eigenproblem& problem, Eigen::Index count, double re
   Pairs pairs;
   {
     const Eigenproblem coarse(levels.back().laplacian, levels.back().mass, nullptr);
-    pairs = block_krylov(coarse, RowMatrix<double>(coarse.size(), 0),
-                         {.count = space, .tolerance = 1e-3, .max_restarts = 20, .seed = 1},
-                         progress.stage("coarse eigenbasis", 0.2, 0.4));
+    if (coarse.size() - coarse.kernel_size() < kRoom * space + 64) {
+      return {Eigen::VectorXd(0), RowMatrix<double>(problem.size(), 0)};
+    }
+    const ProgressRange work = progress.stage("coarse eigenbasis", 0.2, 0.4);
+    pairs = with_all_copies(
+        coarse, space, block_width(space), kCoarseSame,
+        [&](const RowMatrix<double>& locked, Eigen::Index wanted, uint64_t seed) {
+          return block_krylov(
+              coarse, locked,
+              {.count = wanted, .tolerance = kCoarseTolerance, .max_restarts = 20, .seed = seed},
+              work);
+        });
   }
+  count = std::min(count, pairs.size());
   pairs.vectors = prolonged(levels, std::move(pairs.vectors), problem.root_mass());
   problem.leave_kernel(pairs.vectors);
   levels.clear();
 
   double reached = std::numeric_limits<double>::infinity();
   for (int correction = 0; correction < kMaxCorrections; ++correction) {
-    progress.report(0.4 + 0.6 * correction / kMaxCorrections);
+    progress.report(1.0 - 0.6 * std::pow(0.7, correction));
     pairs.values = correct(problem, pairs.vectors);
     reached = problem.residuals(pairs).head(count).maxCoeff();
     if (reached <= std::max(residual, problem.rounding_floor())) {

@@ -8,7 +8,8 @@
 namespace supple {
 
 /// The `count` pairs of smallest value, kernel left out, each with |S x - value x| <= residual *
-/// max(value, 1).
+/// max(value, 1). None where the mesh has too few vertices for a coarse space with room for them;
+/// fewer where the coarse solver finds fewer.
 ///
 /// The mesh is coarsened algebraically (smoothed aggregation: Vanek, Mandel and Brezina 1996), the
 /// coarse eigenproblem solved exactly, its functions prolonged, and corrected by a few inverse

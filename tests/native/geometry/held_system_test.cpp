@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "supple/geometry/held_system.h"
 
+#include <Eigen/Cholesky>
+
 #include "native/gradient_check.h"
 #include "native/support.h"
 #include "supple/geometry/surface_operators.h"
@@ -172,6 +174,85 @@ TEST(HeldSystem, HarmonicMeanOfAHandMadeChain) {
   Points rhs = Points::Zero(3, 3);
   rhs.row(1) << 1, 1, 1;
   EXPECT_TRUE(system.solve(rhs, values).row(1).isApprox(Eigen::RowVector3d(1.5, 2.5, 3.5), 1e-14));
+}
+
+// What the header says, by dense elimination: the free rows' own system.
+Points solved_densely(const Eigen::MatrixXd& matrix, const Eigen::VectorXi& held, const Points& rhs,
+                      const Points& values) {
+  Points result = Points::Zero(rhs.rows(), 3);
+  std::vector<int> free;
+  std::vector<bool> is_held(static_cast<size_t>(rhs.rows()), false);
+  for (Eigen::Index i = 0; i < held.size(); ++i) {
+    result.row(held[i]) = values.row(i);
+    is_held[static_cast<size_t>(held[i])] = true;
+  }
+  for (int i = 0; i < rhs.rows(); ++i) {
+    if (!is_held[static_cast<size_t>(i)]) {
+      free.push_back(i);
+    }
+  }
+  const Eigen::MatrixXd reduced = (rhs - matrix * result)(free, Eigen::all);
+  const Eigen::MatrixXd inner = matrix(free, free);
+  const Eigen::MatrixXd solution = inner.llt().solve(reduced);
+  result(free, Eigen::all) = solution;
+  return result;
+}
+
+TEST(HeldSystem, OneAnalysisServesEverySetOfHeldRows) {
+  const SurfaceOperators operators = operators_of(zoo::perturbed_sphere(2, 7));
+  const int n = static_cast<int>(operators.mass.size());
+  const Points rhs = test::noise(n, 3, 1);
+  for (const Backend backend : {Backend::cholmod, Backend::eigen}) {
+    if (!SparseCholesky::available(backend)) {
+      continue;
+    }
+    const auto shared = std::make_shared<const SymbolicCholesky>(operators.laplacian, backend);
+    std::vector<HeldSystem> systems;
+    const std::vector<Eigen::VectorXi> sets = {
+        Eigen::VectorXi::Constant(1, 5), Eigen::Vector3i(n - 1, 0, 17),
+        Eigen::VectorXi::LinSpaced(n / 2, 0, 2 * (n / 2 - 1)),
+        Eigen::VectorXi::LinSpaced(n, n - 1, 0)};
+    for (const Eigen::VectorXi& held : sets) {
+      systems.emplace_back(operators.laplacian, held, shared);
+    }
+    for (size_t s = 0; s < sets.size(); ++s) {
+      const Points values = test::noise(sets[s].size(), 3, 2);
+      const Points expected =
+          solved_densely(Eigen::MatrixXd(operators.laplacian), sets[s], rhs, values);
+      EXPECT_LT((systems[s].solve(rhs, values) - expected).norm(), 1e-11 * expected.norm())
+          << sets[s].size() << " held";
+    }
+  }
+}
+
+TEST(HeldSystem, TheAnalysisOfAnotherMatrixIsRefused) {
+  const SurfaceOperators operators = operators_of(zoo::icosphere(1));
+  const auto other =
+      std::make_shared<const SymbolicCholesky>(operators_of(zoo::icosphere(2)).laplacian);
+  EXPECT_TRUE(test::fails_with(ErrorCode::wrong_shape, {"42", "162"}, [&] {
+    HeldSystem(operators.laplacian, Eigen::VectorXi::Zero(1), other);
+  }));
+}
+
+TEST(HeldSystem, HeldRowsWhoseDiagonalIsNotPositiveAreTakenOut) {
+  // The middle of three rows would make the matrix indefinite; held, it is not part of it.
+  Eigen::Matrix3d matrix;
+  matrix << 2, -1, 0, -1, -5, -1, 0, -1, 2;
+  const HeldSystem system(matrix.sparseView(), Eigen::VectorXi::Constant(1, 1));
+  const Points got = system.solve(Points::Zero(3, 3), Points::Constant(1, 3, 4.0));
+  EXPECT_TRUE(got.row(0).isApproxToConstant(2.0, 1e-15));
+  EXPECT_TRUE(got.row(2).isApproxToConstant(2.0, 1e-15));
+}
+
+TEST(FreePoisson, OneAnalysisGivesWhatItsOwnGives) {
+  for (const zoo::Entry& entry : zoo::all()) {
+    const SurfaceOperators o = operators_of(entry.mesh);
+    const auto shared = std::make_shared<const SymbolicCholesky>(o.laplacian);
+    const FreePoisson with(o.laplacian, o.mass, o.component, o.component_count, shared);
+    const FreePoisson without(o.laplacian, o.mass, o.component, o.component_count);
+    const Points rhs = test::noise(o.mass.size(), 3, 1);
+    EXPECT_EQ(with.solve(rhs), without.solve(rhs)) << entry.name;
+  }
 }
 
 TEST(HeldSystem, IndexOutOfRange) {

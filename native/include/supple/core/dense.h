@@ -35,7 +35,7 @@ RowMatrix<Scalar> product(const RowMatrix<Scalar>& a, const RowMatrix<Scalar>& b
 std::string blas_name();
 
 /// Eigenvalues, ascending, and eigenvectors of a symmetric matrix, in place of it (columns), by
-/// LAPACK's divide and conquer. Errors: `no_convergence`.
+/// LAPACK's divide and conquer. Errors: `no_convergence`, also for numbers that are not finite.
 Eigen::VectorXd symmetric_eigen(Eigen::MatrixXd& matrix);
 
 }  // namespace supple

@@ -12,11 +12,13 @@ namespace supple {
 
 /// How eigenfunctions are found.
 enum class EigenMethod {
-  automatic,        ///< `multiresolution` from 250,000 vertices, else `block_krylov`
-  block_krylov,     ///< shift-invert block Krylov-Schur on the Cholesky factor
-  multiresolution,  ///< a coarse basis, prolonged and corrected; residual 1e-2 instead of 1e-8
-  lanczos,          ///< shift-invert Lanczos by Spectra, the reference
-  dense,            ///< every eigenvalue; chosen by itself on small meshes, whatever is asked
+  automatic,     ///< `multiresolution` from 250,000 vertices, else `block_krylov`
+  block_krylov,  ///< shift-invert block Krylov-Schur on the Cholesky factor
+  /// A coarse basis, prolonged and corrected; residual 1e-2 instead of 1e-8. On meshes of less than
+  /// some 30 vertices a function, `block_krylov`.
+  multiresolution,
+  lanczos,  ///< shift-invert Lanczos by Spectra, the reference
+  dense,    ///< every eigenvalue; chosen by itself on small meshes, whatever is asked
 };
 const char* to_string(EigenMethod method);
 /// Errors: `bad_option` for any other name.
