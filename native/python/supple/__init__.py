@@ -7,7 +7,8 @@ Source: "Deformation Recovery: Localized Learning for Detail-Preserving Deformat
 2024.
 """
 
-from . import _environment, cache  # the first before anything loads the native module
+from . import _environment as _environment  # first: it acts before the native module loads
+from . import cache
 from ._native import PreparedCache, Progress, __version__, blas_name, simd_level
 from .deforming import deform
 from .editing import Editor, EditResult, Handle, edit

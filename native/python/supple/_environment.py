@@ -28,8 +28,8 @@ def _prepare() -> None:
     # OpenMP's threads spin between loops unless told to sleep, and beside a busy Blender that costs
     # far more than waking them (measured 17 times on 2 cores).
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
-    # OpenBLAS knows processors by their model number and takes kernels of 2004 for one that is newer
-    # than itself (measured 3 to 6 times slower). What a processor can do is in its flags.
+    # OpenBLAS knows processors by their model number and takes kernels of 2004 for one newer than
+    # itself (measured 3 to 6 times slower). What a processor can do is in its flags.
     if "OPENBLAS_CORETYPE" not in os.environ and (kernels := _kernels()):
         os.environ["OPENBLAS_CORETYPE"] = kernels
 
