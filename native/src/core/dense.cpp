@@ -3,10 +3,12 @@
 
 #include <cblas.h>
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "supple/core/error.h"
+#include "supple/core/parallel.h"
 
 extern "C" void dsyevd_(const char* jobz, const char* uplo, const int* n, double* a, const int* lda,
                         double* w, double* work, const int* lwork, int* iwork, const int* liwork,
@@ -81,6 +83,11 @@ Eigen::VectorXd symmetric_eigen(Eigen::MatrixXd& matrix) {
   double wanted = 0.0;
   dsyevd_("V", "L", &n, matrix.data(), &n, values.data(), &wanted, &ask, &wanted_integers, &ask,
           &info);
+  // LAPACK goes through thousands of small BLAS calls.
+  std::optional<SingleThread> alone;
+  if (n < 1500) {
+    alone.emplace();
+  }
   std::vector<double> work(static_cast<size_t>(wanted));
   std::vector<int> integers(static_cast<size_t>(wanted_integers));
   const int work_size = static_cast<int>(work.size()),

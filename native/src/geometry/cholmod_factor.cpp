@@ -8,11 +8,13 @@
 
 #include <algorithm>
 #include <new>
+#include <optional>
 #include <vector>
 
 #include "factor.h"
 #include "supernodal_solve.h"
 #include "supple/core/error.h"
+#include "supple/core/parallel.h"
 
 namespace supple {
 namespace {
@@ -180,12 +182,12 @@ std::unique_ptr<const Factor> CholmodSymbolic::factor(const SparseMatrix& matrix
   FactorPointer factor(cholmod_copy_factor(impl_->analysis.get(), &session.common));
   check_memory(session);
   cholmod_sparse values = view(matrix);
-  const int threads = omp_get_max_threads();
+  std::optional<SingleThread> alone;
   if (impl_->work < kThreadedWork) {
-    omp_set_num_threads(1);  // this thread's own setting; OpenBLAS asks for it
+    alone.emplace();
   }
   cholmod_factorize(&values, factor.get(), &session.common);
-  omp_set_num_threads(threads);
+  alone.reset();
   check_memory(session);
   if (session.common.status != CHOLMOD_OK || factor->minor != factor->n) {
     throw_not_definite(matrix.rows());

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "supple/learning/silu.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -33,42 +32,59 @@ SUPPLE_INLINE void exponential(V& x) {
   x = p * reinterpret_cast<V>(bits);
 }
 
+// Calls step(i, bytes) for each vector of a row; all bytes of one but at the end.
+template <int Bytes, class Step>
+SUPPLE_INLINE void over_row(Eigen::Index count, const Step& step) {
+  constexpr Eigen::Index lanes = Lanes<float, Bytes>::count;
+  Eigen::Index i = 0;
+  for (; i + lanes <= count; i += lanes) {
+    step(i, Bytes);
+  }
+  if (i < count) {
+    step(i, static_cast<int>((count - i) * static_cast<Eigen::Index>(sizeof(float))));
+  }
+}
+
+template <class V>
+SUPPLE_INLINE void load(V& vector, const float* from, int bytes) {
+  std::memcpy(&vector, from, static_cast<size_t>(bytes));
+}
+template <class V>
+SUPPLE_INLINE void store(const V& vector, float* to, int bytes) {
+  std::memcpy(to, &vector, static_cast<size_t>(bytes));
+}
+
 template <int Bytes>
 SUPPLE_INLINE void forward_row(const float* bias, float* x, float* y, Eigen::Index count) {
   using V = typename Lanes<float, Bytes>::type;
-  constexpr int lanes = Lanes<float, Bytes>::count;
-  Eigen::Index i = 0;
-  for (; i < count; i += lanes) {
-    const size_t bytes =
-        sizeof(float) * static_cast<size_t>(std::min<Eigen::Index>(lanes, count - i));
-    V value = {}, b = {};
-    std::memcpy(&value, x + i, bytes);
-    std::memcpy(&b, bias + i, bytes);
-    value += b;
-    V power = -value;
-    exponential<Bytes>(power);
-    const V result = value / (1.0f + power);
-    std::memcpy(x + i, &value, bytes);
-    std::memcpy(y + i, &result, bytes);
-  }
+  over_row<Bytes>(
+      count, [&](Eigen::Index i, int bytes) __attribute__((always_inline)) {
+        V value = {}, b = {};
+        load(value, x + i, bytes);
+        load(b, bias + i, bytes);
+        value += b;
+        V power = -value;
+        exponential<Bytes>(power);
+        const V result = value / (1.0f + power);
+        store(value, x + i, bytes);
+        store(result, y + i, bytes);
+      });
 }
 
 template <int Bytes>
 SUPPLE_INLINE void backward_row(const float* x, const float* grad, float* out, Eigen::Index count) {
   using V = typename Lanes<float, Bytes>::type;
-  constexpr int lanes = Lanes<float, Bytes>::count;
-  for (Eigen::Index i = 0; i < count; i += lanes) {
-    const size_t bytes =
-        sizeof(float) * static_cast<size_t>(std::min<Eigen::Index>(lanes, count - i));
-    V value = {}, g = {};
-    std::memcpy(&value, x + i, bytes);
-    std::memcpy(&g, grad + i, bytes);
-    V power = -value;
-    exponential<Bytes>(power);
-    const V sigmoid = 1.0f / (1.0f + power);
-    const V result = g * sigmoid * (1.0f + value * (1.0f - sigmoid));
-    std::memcpy(out + i, &result, bytes);
-  }
+  over_row<Bytes>(
+      count, [&](Eigen::Index i, int bytes) __attribute__((always_inline)) {
+        V value = {}, g = {};
+        load(value, x + i, bytes);
+        load(g, grad + i, bytes);
+        V power = -value;
+        exponential<Bytes>(power);
+        const V sigmoid = 1.0f / (1.0f + power);
+        const V result = g * sigmoid * (1.0f + value * (1.0f - sigmoid));
+        store(result, out + i, bytes);
+      });
 }
 
 using RowForward = void (*)(const float*, float*, float*, Eigen::Index);

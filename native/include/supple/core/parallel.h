@@ -9,4 +9,16 @@ int thread_count();
 /// count >= 1. Errors: `bad_option`.
 void set_thread_count(int count);
 
+/// One thread while it lives, for many small steps: waking another takes longer than such a step.
+class SingleThread {
+ public:
+  SingleThread() : before_(thread_count()) { set_thread_count(1); }
+  ~SingleThread() { set_thread_count(before_); }
+  SingleThread(const SingleThread&) = delete;
+  SingleThread& operator=(const SingleThread&) = delete;
+
+ private:
+  int before_;
+};
+
 }  // namespace supple
