@@ -314,19 +314,22 @@ TEST_F(CachedMesh, AFileWithTheRightSumsAndWrongArraysIsRebuilt) {
   const std::string key = file.stem().string().substr(std::string("prepared-").size());
   RowMatrix<double> functions = first->basis.functions;
   Eigen::VectorXd values = first->basis.values, residual = Eigen::VectorXd::Zero(1);
-  Eigen::VectorXi samples = first->sampled.samples;
+  Eigen::VectorXi ordering = first->symbolic->ordering(), samples = first->sampled.samples;
   RowMatrix<float> projector = first->sampled.domain.projector;
   const auto replace = [&] {
     fs::remove(file);
-    const std::vector<NamedArray> arrays{{"eigenfunctions", functions},
-                                         {"eigenvalues", values},
-                                         {"residual", residual},
-                                         {"samples", samples},
-                                         {"projector", projector}};
+    const std::vector<NamedArray> arrays{{"eigenfunctions", functions}, {"eigenvalues", values},
+                                         {"residual", residual},        {"ordering", ordering},
+                                         {"samples", samples},          {"projector", projector}};
     write_array_file(file, key, arrays);
   };
   replace();
   EXPECT_TRUE(prepare(&cache)->from_cache);  // the names above are those in use
+  std::swap(ordering[3], ordering[4]);
+  ordering[5] = ordering[6];
+  replace();
+  EXPECT_EQ(codes(prepare(&cache)->notes), Codes{"cache_rebuilt"});
+  ordering = first->symbolic->ordering();
   samples[3] = static_cast<int>(mesh.vertices.rows());
   replace();
   EXPECT_EQ(codes(prepare(&cache)->notes), Codes{"cache_rebuilt"});
