@@ -22,8 +22,6 @@ namespace {
 constexpr double kMultiple = 1e-4;
 // Copies of an eigenvalue closer than this are told apart by rounding alone.
 constexpr double kSame = 1e-7;
-// From here, an exact basis takes gigabytes and a minute.
-constexpr Eigen::Index kLarge = 250000;
 
 constexpr std::pair<EigenMethod, const char*> kMethods[] = {
     {EigenMethod::automatic, "automatic"},
@@ -43,7 +41,7 @@ EigenMethod chosen(EigenMethod asked, Eigen::Index n, Eigen::Index count) {
   if (asked != EigenMethod::automatic) {
     return asked;
   }
-  return n >= kLarge ? EigenMethod::multiresolution : EigenMethod::block_krylov;
+  return EigenMethod::block_krylov;
 }
 
 Pairs dense_pairs(const SparseMatrix& symmetric, Eigen::Index count) {

@@ -12,7 +12,7 @@ namespace supple {
 
 /// How eigenfunctions are found.
 enum class EigenMethod {
-  automatic,     ///< `multiresolution` from 250,000 vertices, else `block_krylov`
+  automatic,     ///< `block_krylov`
   block_krylov,  ///< shift-invert block Krylov-Schur on the Cholesky factor
   /// A coarse basis, prolonged and corrected; residual 1e-2 instead of 1e-8. On meshes of less than
   /// some 30 vertices a function, `block_krylov`.
