@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sets what the libraries under the native module read from the environment when they load.
+"""Loads the native module in the environment that the libraries under it need.
 
-On import, because it has to come before the native module's.
+They read it when they load. Afterwards it is as it was: a program started from here, or a library
+loaded later, is not to calculate otherwise because of us.
 """
 
 import os
@@ -24,14 +25,22 @@ def _kernels() -> str | None:
     return None
 
 
-def _prepare() -> None:
-    # OpenMP's threads spin between loops unless told to sleep, and beside a busy Blender that costs
-    # far more than waking them (measured 17 times on 2 cores).
-    os.environ.setdefault("OMP_WAIT_POLICY", "passive")
-    # OpenBLAS knows processors by their model number and takes kernels of 2004 for one newer than
-    # itself (measured 3 to 6 times slower). What a processor can do is in its flags.
-    if "OPENBLAS_CORETYPE" not in os.environ and (kernels := _kernels()):
-        os.environ["OPENBLAS_CORETYPE"] = kernels
+def _load() -> None:
+    wanted = {
+        # OpenMP's threads spin between loops unless told to sleep, and beside a busy Blender that
+        # costs far more than waking them (measured 17 times on 2 cores).
+        "OMP_WAIT_POLICY": "passive",
+        # OpenBLAS knows processors by their model number and takes kernels of 2004 for one newer
+        # than itself (measured 3 to 6 times slower). What a processor can do is in its flags.
+        "OPENBLAS_CORETYPE": _kernels(),
+    }
+    ours = {name: value for name, value in wanted.items() if value and name not in os.environ}
+    os.environ.update(ours)
+    try:
+        from . import _native  # noqa: F401
+    finally:
+        for name in ours:
+            del os.environ[name]
 
 
-_prepare()
+_load()
