@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "factor.h"
+#include "ordering.h"
 #include "supple/core/error.h"
 
 namespace supple {
@@ -55,15 +57,7 @@ void check_square(const SparseMatrix& matrix) {
 }
 
 void check_ordering(const Eigen::VectorXi& ordering, Eigen::Index n) {
-  std::vector<bool> seen(static_cast<size_t>(n), false);
-  bool right = ordering.size() == n;
-  for (Eigen::Index i = 0; right && i < n; ++i) {
-    right = ordering[i] >= 0 && ordering[i] < n && !seen[static_cast<size_t>(ordering[i])];
-    if (right) {
-      seen[static_cast<size_t>(ordering[i])] = true;
-    }
-  }
-  if (!right) {
+  if (!is_ordering(ordering, n)) {
     throw Error(ErrorCode::bad_option, "The ordering given for a system of " + std::to_string(n) +
                                            " rows does not name each of them once.");
   }
@@ -117,6 +111,18 @@ void check_symmetric(const SparseMatrix& matrix) {
       }
     }
   }
+}
+
+bool is_ordering(const Eigen::VectorXi& ordering, Eigen::Index n) {
+  std::vector<bool> seen(static_cast<size_t>(n), false);
+  bool right = ordering.size() == n;
+  for (Eigen::Index i = 0; right && i < n; ++i) {
+    right = ordering[i] >= 0 && ordering[i] < n && !seen[static_cast<size_t>(ordering[i])];
+    if (right) {
+      seen[static_cast<size_t>(ordering[i])] = true;
+    }
+  }
+  return right;
 }
 
 void throw_not_definite(Eigen::Index n) {

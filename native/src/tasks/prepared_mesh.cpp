@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "geometry/ordering.h"
 #include "supple/core/content_hash.h"
 #include "supple/core/error.h"
 
@@ -51,17 +52,6 @@ struct Kept {
   }
 };
 
-bool is_permutation_of(const Eigen::VectorXi& ordering, Eigen::Index n) {
-  std::vector<int> sorted(ordering.data(), ordering.data() + ordering.size());
-  std::sort(sorted.begin(), sorted.end());
-  for (size_t i = 0; i < sorted.size(); ++i) {
-    if (sorted[i] != static_cast<int>(i)) {
-      return false;
-    }
-  }
-  return static_cast<Eigen::Index>(sorted.size()) == n;
-}
-
 }  // namespace
 
 PreparedMesh::PreparedMesh(const Points& vertices, const Faces& faces,
@@ -101,7 +91,7 @@ bool PreparedMesh::load(const PrepareOptions& options, const PreparedCache& cach
   const auto fits = [&] {
     return basis.functions.rows() == n && basis.functions.cols() == count &&
            basis.values.size() == count && kept.residual.size() == 1 &&
-           is_permutation_of(kept.ordering, n) && kept.samples.size() == points &&
+           is_ordering(kept.ordering, n) && kept.samples.size() == points &&
            kept.samples.minCoeff() >= 0 && kept.samples.maxCoeff() < n &&
            kept.projector.cols() == points &&
            kept.projector.rows() == basis.stable_count(options.eigenfunctions);
