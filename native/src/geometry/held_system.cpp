@@ -58,12 +58,6 @@ SparseMatrix with_held_rows(const SparseMatrix& matrix, const Eigen::VectorXi& h
   return result;
 }
 
-std::shared_ptr<const SymbolicCholesky> or_own(std::shared_ptr<const SymbolicCholesky> symbolic,
-                                               const SparseMatrix& matrix) {
-  return symbolic != nullptr ? std::move(symbolic)
-                             : std::make_shared<const SymbolicCholesky>(matrix);
-}
-
 Eigen::VectorXi first_of_each(const Eigen::VectorXi& component, int count) {
   Eigen::VectorXi first = Eigen::VectorXi::Constant(count, -1);
   for (int i = 0; i < component.size(); ++i) {
@@ -80,7 +74,7 @@ HeldSystem::HeldSystem(const SparseMatrix& matrix, const Eigen::VectorXi& held,
                        std::shared_ptr<const SymbolicCholesky> symbolic)
     : held_(held),
       coupling_(coupling_of(matrix, held)),
-      factor_(with_held_rows(matrix, held), or_own(std::move(symbolic), matrix)) {}
+      factor_(with_held_rows(matrix, held), std::move(symbolic)) {}
 
 Points HeldSystem::solve(const Points& rhs, const Points& held_values) const {
   RowMatrix<double> reduced = rhs;

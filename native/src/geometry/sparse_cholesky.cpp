@@ -211,6 +211,9 @@ SparseCholesky::SparseCholesky(const SparseMatrix& matrix, Backend backend)
 SparseCholesky::SparseCholesky(const SparseMatrix& matrix,
                                std::shared_ptr<const SymbolicCholesky> symbolic) {
   check_square(matrix);
+  if (symbolic == nullptr) {
+    symbolic = std::make_shared<const SymbolicCholesky>(matrix);
+  }
   const SymbolicCholesky::Impl& shared = *symbolic->impl_;
   if (matrix.rows() != shared.size || matrix.nonZeros() != shared.entries) {
     throw Error(ErrorCode::wrong_shape,

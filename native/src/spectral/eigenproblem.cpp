@@ -27,9 +27,6 @@ Eigenproblem::Eigenproblem(const SparseMatrix& laplacian, const Eigen::VectorXd&
       shift_(1.0 / mass.sum()) {
   const Eigen::VectorXd inverse_root = root_mass_.cwiseInverse();
   symmetric_ = inverse_root.asDiagonal() * laplacian * inverse_root.asDiagonal();
-  if (symbolic == nullptr) {
-    symbolic = std::make_shared<const SymbolicCholesky>(laplacian);
-  }
   factor_ =
       std::make_unique<const SparseCholesky>(shifted(laplacian, mass, shift_), std::move(symbolic));
   find_components();

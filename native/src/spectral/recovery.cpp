@@ -50,11 +50,6 @@ void check_rows(const char* what, Eigen::Index rows, Eigen::Index expected, cons
   }
 }
 
-SparseCholesky factored(const SparseMatrix& system,
-                        std::shared_ptr<const SymbolicCholesky> symbolic) {
-  return symbolic != nullptr ? SparseCholesky(system, std::move(symbolic)) : SparseCholesky(system);
-}
-
 }  // namespace
 
 const char* to_string(RecoveryForm form) {
@@ -101,7 +96,7 @@ EmbeddingRecovery::EmbeddingRecovery(const SparseMatrix& laplacian, const Eigen:
     : options_(options),
       mass_(mass / mass.sum()),
       divergence_(std::move(divergence)),
-      factor_(factored(system(laplacian, mass, options), std::move(symbolic))) {
+      factor_(system(laplacian, mass, options), std::move(symbolic)) {
   check_rows("rows of the divergence", divergence_.rows(), mass.size(), "vertices");
   if (options.form == RecoveryForm::literal) {
     laplacian_ = laplacian;

@@ -77,8 +77,8 @@ class SparseCholesky {
   /// Errors: `not_positive_definite`; `wrong_shape` if not square; `bad_option` if the backend is
   /// not available.
   explicit SparseCholesky(const SparseMatrix& matrix, Backend backend = default_backend());
-  /// matrix: with the pattern that `symbolic` was made from. Errors: `not_positive_definite`;
-  /// `wrong_shape` for another number of rows or entries.
+  /// matrix: with the pattern that `symbolic` was made from; nullptr to analyse it here. Errors:
+  /// `not_positive_definite`; `wrong_shape` for another number of rows or entries.
   SparseCholesky(const SparseMatrix& matrix, std::shared_ptr<const SymbolicCholesky> symbolic);
   ~SparseCholesky();
   SparseCholesky(SparseCholesky&&) noexcept;
