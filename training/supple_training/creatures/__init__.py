@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Random articulated creatures that are made here, from no one else's data.
+
+A creature is a random skeleton (`families`), a smooth skin with small bumps and folds around it
+(`skin`), and weights by which the skin follows the joints' turns (`poses`). Lengths are metres; the
+skin's area is about a human body's. Everything random takes a `numpy.random.Generator`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple_training.bodies import HELD_OUT_GRID, self_intersection
+from supple_training.creatures.families import FAMILIES
+from supple_training.creatures.poses import follow, joint_motions, sample_turns
+from supple_training.creatures.skeleton import FloatArray, Skeleton
+from supple_training.creatures.skin import IntArray, skin
+from supple_training.remesh import (
+    component_count,
+    euler_characteristic,
+    is_closed_manifold,
+    remesh,
+    unit_normals,
+)
+
+_ATTEMPTS = 20
+
+
+@dataclass(frozen=True)
+class Creature:
+    """A skeleton in its skin, at rest."""
+
+    skeleton: Skeleton
+    vertices: FloatArray
+    """(n, 3) in metres."""
+    faces: IntArray
+    """(m, 3): one closed manifold surface, counterclockwise from outside."""
+    weights: FloatArray
+    """(n, joints): how far each vertex follows each joint; rows sum to 1."""
+
+    def posed(self, turns: FloatArray) -> FloatArray:
+        """The skin (n, 3) after turns (joints, 3) in degrees about the joints' own axes."""
+        return follow(self.vertices, self.weights, *joint_motions(self.skeleton, turns))
+
+
+def is_held_out(traits: FloatArray) -> bool:
+    """Whether a creature of traits (limb length, thickness) in [0, 1] is kept from training.
+
+    One cell in four of a grid, as for bodies, in every family.
+    """
+    cell = np.minimum((np.asarray(traits) * HELD_OUT_GRID).astype(int), HELD_OUT_GRID - 1)
+    return bool(cell.sum() % 4 == 3)
+
+
+def sample_traits(rng: np.random.Generator, *, held_out: bool = False) -> FloatArray:
+    """(2,) random traits in [0, 1], limb length and thickness, of training or held-out creatures."""
+    while True:
+        traits = rng.random(2)
+        if is_held_out(traits) == held_out:
+            return traits
+
+
+def volume(vertices: FloatArray, faces: IntArray) -> float:
+    """The volume inside a closed surface, in cubic metres."""
+    corner = vertices[faces]
+    return float(np.einsum("md,md->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6)
+
+
+def sample_creature(
+    rng: np.random.Generator, *, held_out: bool = False, family: str | None = None
+) -> Creature:
+    """A random creature, of a random family unless one is named.
+
+    Raises RuntimeError when none of several skins is a single closed surface.
+    """
+    makers = list(FAMILIES)
+    if family is not None:
+        makers = [maker for maker in makers if maker.__name__ == family]
+    share = np.array([FAMILIES[maker] for maker in makers])
+    maker = makers[int(rng.choice(len(makers), p=share / share.sum()))]
+    for _ in range(_ATTEMPTS):
+        skeleton = maker(*sample_traits(rng, held_out=held_out), rng)
+        made = skin(skeleton, rng)
+        if made is None:
+            continue
+        vertices, faces, weights = made
+        if (
+            is_closed_manifold(faces)
+            and component_count(faces) == 1
+            and euler_characteristic(faces) == 2
+            and volume(vertices, faces) > 0
+        ):
+            return Creature(skeleton, vertices, faces, weights)
+    raise RuntimeError(f"none of {_ATTEMPTS} skins of a {maker.__name__} was one closed surface")
+
+
+def collapsed_share(rest: FloatArray, posed: FloatArray, faces: IntArray) -> float:
+    """The share of faces, from 0 to 1, that a pose makes less than a tenth as large."""
+    _, before = unit_normals(rest, faces)
+    _, after = unit_normals(posed, faces)
+    return float(np.mean(after < 0.1 * before))
+
+
+def sample_pose(
+    creature: Creature, rng: np.random.Generator, *, intersection_limit: float = 0.015
+) -> FloatArray:
+    """The creature in a random plausible pose: (n, 3) in metres.
+
+    Drawn again, a little nearer to rest each time, while more than `intersection_limit` of the
+    surface cuts into the creature, beyond what already does at rest, or volume or faces collapse.
+
+    Raises RuntimeError when no pose is free enough of that.
+    """
+    rest, faces = creature.vertices, creature.faces
+    allowed = self_intersection(rest, faces) + intersection_limit
+    full = volume(rest, faces)
+    for attempt in range(_ATTEMPTS):
+        turns = sample_turns(creature.skeleton, rng) * (1 - 0.6 * attempt / _ATTEMPTS)
+        posed = creature.posed(turns)
+        if (
+            abs(volume(posed, faces) / full - 1) < 0.12
+            and collapsed_share(rest, posed, faces) < 0.002
+            and self_intersection(posed, faces) <= allowed
+        ):
+            return posed
+    raise RuntimeError(
+        f"no pose out of {_ATTEMPTS} kept self intersection below {allowed:.3f}; "
+        "widen intersection_limit or narrow the joint ranges"
+    )
+
+
+def make_creature_pair(
+    rng: np.random.Generator,
+    *,
+    held_out: bool = False,
+    at_rest: bool = False,
+    vertices: tuple[int, int] = (3500, 6500),
+    family: str | None = None,
+) -> tuple[FloatArray, NDArray[np.int32], FloatArray]:
+    """A pair of a new creature: source (n, 3), faces (m, 3), target (n, 3).
+
+    The source is at rest or posed, triangulated in its own way; the target is another pose.
+
+    Raises RuntimeError when no good creature, triangulation or pose is found.
+    """
+    creature = sample_creature(rng, held_out=held_out, family=family)
+    # Triangulated at rest, where the limbs are well apart.
+    surface = remesh(creature.vertices, creature.faces, rng, vertex_count=vertices)
+    source = creature.vertices if at_rest else sample_pose(creature, rng)
+    target = sample_pose(creature, rng)
+    return surface.carry(source), surface.faces.astype(np.int32), surface.carry(target)
