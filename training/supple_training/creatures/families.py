@@ -8,6 +8,7 @@ trunk lengths; flexion (x) of a part that points forward is downwards, of a leg 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
