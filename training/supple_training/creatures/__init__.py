@@ -17,9 +17,8 @@ from supple_training.bodies import HELD_OUT_GRID, self_intersection
 from supple_training.creatures.families import FAMILIES
 from supple_training.creatures.poses import follow, joint_motions, sample_turns
 from supple_training.creatures.skeleton import FloatArray, Skeleton
-from supple_training.creatures.skin import IntArray, skin
+from supple_training.creatures.skin import IntArray, skin, spread
 from supple_training.remesh import (
-    component_count,
     euler_characteristic,
     is_closed_manifold,
     remesh,
@@ -70,15 +69,17 @@ def volume(vertices: FloatArray, faces: IntArray) -> float:
 
 
 def sample_creature(
-    rng: np.random.Generator, *, held_out: bool = False, family: str | None = None
+    rng: np.random.Generator,
+    *,
+    held_out: bool = False,
+    vertices: tuple[int, int] = (3500, 6500),
+    family: str | None = None,
 ) -> Creature:
-    """A random creature, of a random family unless one is named.
+    """A random creature in a triangulation of its own, of a random family unless one is named.
 
     Raises RuntimeError when none of several skins is a single closed surface.
     """
-    makers = list(FAMILIES)
-    if family is not None:
-        makers = [maker for maker in makers if maker.__name__ == family]
+    makers = [maker for maker in FAMILIES if family in (None, maker.__name__)]
     share = np.array([FAMILIES[maker] for maker in makers])
     maker = makers[int(rng.choice(len(makers), p=share / share.sum()))]
     for _ in range(_ATTEMPTS):
@@ -86,14 +87,16 @@ def sample_creature(
         made = skin(skeleton, rng)
         if made is None:
             continue
-        vertices, faces, weights = made
-        if (
-            is_closed_manifold(faces)
-            and component_count(faces) == 1
-            and euler_characteristic(faces) == 2
-            and volume(vertices, faces) > 0
-        ):
-            return Creature(skeleton, vertices, faces, weights)
+        rest, faces, weights, thickness = made
+        if not is_closed_manifold(faces) or euler_characteristic(faces) != 2:
+            continue
+        # Triangulated at rest, where the limbs are well apart.
+        surface = remesh(rest, faces, rng, vertex_count=vertices)
+        rest = surface.carry(rest)
+        weights = spread(
+            rest, surface.faces, surface.carry(weights), surface.carry(thickness[:, None])[:, 0]
+        )
+        return Creature(skeleton, rest, surface.faces, weights)
     raise RuntimeError(f"none of {_ATTEMPTS} skins of a {maker.__name__} was one closed surface")
 
 
@@ -146,9 +149,7 @@ def make_creature_pair(
 
     Raises RuntimeError when no good creature, triangulation or pose is found.
     """
-    creature = sample_creature(rng, held_out=held_out, family=family)
-    # Triangulated at rest, where the limbs are well apart.
-    surface = remesh(creature.vertices, creature.faces, rng, vertex_count=vertices)
+    creature = sample_creature(rng, held_out=held_out, vertices=vertices, family=family)
     source = creature.vertices if at_rest else sample_pose(creature, rng)
     target = sample_pose(creature, rng)
-    return surface.carry(source), surface.faces.astype(np.int32), surface.carry(target)
+    return source, creature.faces.astype(np.int32), target

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from supple_training.creatures.skeleton import FloatArray, Skeleton, resample
-from supple_training.remesh import _relax
+from supple_training.remesh import relax
 
 IntArray = NDArray[np.int64]
 
@@ -43,17 +43,22 @@ class _Tubes:
     blend: float
     flat: float
 
-    def distances(self, points: FloatArray, segments: slice) -> tuple[FloatArray, ...]:
-        """Signed distance, radius and place along the chain at points (n, 3): each (n, s)."""
-        start, along = self.start[segments], (self.end - self.start)[segments]
-        first, last = segments.indices(len(self.start))[:2]
+    def distances(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Of points (n, 3): signed distance, radius and place along the chain, each (n,)."""
+        along = self.end - self.start
+        square = np.sum(along**2, axis=1)
         q = points @ self.stretch.T
-        t = (q @ along.T - np.sum(start * along, axis=1)) / np.sum(along**2, axis=1)
-        t = np.clip(t, 0.0, 1.0)
-        off = q[:, None] - start - t[..., None] * along
-        radius = self.radii[first:last] + t * np.diff(self.radii[first : last + 1])
-        place = self.place[first:last] + t * np.diff(self.place[first : last + 1])
-        return np.sqrt(np.einsum("nsd,nsd->ns", off, off)) - radius, radius, place
+        ahead = q @ along.T - np.sum(self.start * along, axis=1)
+        t = np.clip(ahead / square, 0.0, 1.0)
+        off = np.sum(q**2, axis=1)[:, None] - 2 * q @ self.start.T + np.sum(self.start**2, axis=1)
+        off += t * (t * square - 2 * ahead)
+        distance = np.sqrt(np.maximum(off, 0.0))
+        distance -= self.radii[:-1] + t * np.diff(self.radii)
+        near = distance.argmin(axis=1)
+        row = np.arange(len(points))
+        t = t[row, near]
+        radius = self.radii[near] + t * np.diff(self.radii)[near]
+        return distance[row, near], radius, self.place[near] + t * np.diff(self.place)[near]
 
     def on_grid(self, axes: list[FloatArray], i: int) -> FloatArray:
         """Segment i's signed distance in blend lengths on the grid that axes (3 arrays) span."""
@@ -153,16 +158,13 @@ def _influence(
     firsts = skeleton.first_joints()
     weights = np.zeros((n, sum(chain.joints for chain in skeleton.chains)))
     thickness, most = np.zeros(n), np.zeros(n)
-    row = np.arange(n)
     for number, (tube, chain) in enumerate(zip(tubes, skeleton.chains, strict=True)):
-        distance, radius, place = tube.distances(vertices, slice(0, len(tube.start)))
-        near = distance.argmin(axis=1)
-        radius = radius[row, near]
-        share = np.exp(-np.maximum(distance[row, near] / (tube.blend * radius), -2.0))
+        distance, radius, place = tube.distances(vertices)
+        share = np.exp(-np.maximum(distance / (tube.blend * radius), -2.0))
         share[share < np.exp(-REACH)] = 0.0
         if chain.joints:
-            joint = np.minimum(place[row, near].astype(int), chain.joints - 1)
-            weights[row, firsts[number] + joint] += share
+            joint = np.clip(place.astype(int), 0, chain.joints - 1)
+            weights[np.arange(n), firsts[number] + joint] += share
         else:
             weights[:, max(skeleton.carrier(number), 0)] += share
         thickness = np.where(share > most, radius * np.sqrt(tube.flat), thickness)
@@ -170,7 +172,7 @@ def _influence(
     return weights / weights.sum(axis=1, keepdims=True), thickness
 
 
-def _spread(
+def spread(
     vertices: FloatArray, faces: IntArray, weights: FloatArray, thickness: FloatArray
 ) -> FloatArray:
     """Heat that starts as the weights and spreads twice, by about 0.4 of the thickness."""
@@ -240,16 +242,16 @@ def fused(skeleton: Skeleton, faces: IntArray, weights: FloatArray) -> bool:
 
 def skin(
     skeleton: Skeleton, rng: np.random.Generator
-) -> tuple[FloatArray, IntArray, FloatArray] | None:
-    """Skin vertices (n, 3) in metres, faces (m, 3), and weights (n, joints) that sum to 1.
+) -> tuple[FloatArray, IntArray, FloatArray, FloatArray] | None:
+    """The skin of a skeleton, or None when parts that are apart touch each other.
 
-    None when parts that are apart touch each other.
+    Vertices (n, 3) in metres, faces (m, 3), weights (n, joints) that `spread` makes smooth, and the
+    local thickness (n,) in metres.
     """
     tubes = _tubes(skeleton)
     vertices, faces = _largest_piece(*_surface(tubes))
-    vertices = _relax(vertices, faces, 6)
+    vertices = relax(vertices, faces, 6)
     weights, thickness = _influence(tubes, skeleton, vertices)
     if fused(skeleton, faces, weights):
         return None
-    weights = _spread(vertices, faces, weights, thickness)
-    return _detail(vertices, faces, thickness, rng), faces, weights
+    return _detail(vertices, faces, thickness, rng), faces, weights, thickness
