@@ -77,7 +77,8 @@ def sample_creature(
 ) -> Creature:
     """A random creature in a triangulation of its own, of a random family unless one is named.
 
-    Raises RuntimeError when none of several skins is a single closed surface.
+    Raises RuntimeError when none of several skins is a single closed surface that can be
+    triangulated with so few vertices.
     """
     makers = [maker for maker in FAMILIES if family in (None, maker.__name__)]
     share = np.array([FAMILIES[maker] for maker in makers])
@@ -91,13 +92,18 @@ def sample_creature(
         if not is_closed_manifold(faces) or euler_characteristic(faces) != 2:
             continue
         # Triangulated at rest, where the limbs are well apart.
-        surface = remesh(rest, faces, rng, vertex_count=vertices)
+        try:
+            surface = remesh(rest, faces, rng, vertex_count=vertices, attempts=6)
+        except RuntimeError:  # too thin for so few vertices
+            continue
         rest = surface.carry(rest)
         weights = spread(
             rest, surface.faces, surface.carry(weights), surface.carry(thickness[:, None])[:, 0]
         )
         return Creature(skeleton, rest, surface.faces, weights)
-    raise RuntimeError(f"none of {_ATTEMPTS} skins of a {maker.__name__} was one closed surface")
+    raise RuntimeError(
+        f"none of {_ATTEMPTS} skins of a {maker.__name__} was one closed surface with a good triangulation"
+    )
 
 
 def collapsed_share(rest: FloatArray, posed: FloatArray, faces: IntArray) -> float:

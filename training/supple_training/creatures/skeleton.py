@@ -98,9 +98,7 @@ def resample(points: FloatArray, count: int) -> FloatArray:
     i = np.minimum(fine.astype(int), k - 2)
     t = (fine - i)[:, None]
     a, b, c, d = (ahead[i + j] for j in range(4))  # Catmull-Rom
-    curve = b + 0.5 * t * (
-        c - a + t * (2 * a - 5 * b + 4 * c - d + t * (3 * (b - c) + d - a))
-    )
+    curve = b + 0.5 * t * (c - a + t * (2 * a - 5 * b + 4 * c - d + t * (3 * (b - c) + d - a)))
     length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(curve[:, :3], axis=0), axis=1))])
     even = np.linspace(0, length[-1], count + 1)
     return np.stack([np.interp(even, length, column) for column in curve.T], axis=1)
@@ -149,8 +147,15 @@ class Builder:
         ranges = np.stack([_ranges(value, k) for value in (x, y, z)], axis=1)
         self.chains.append(
             Chain(
-                kind, rows[:, :3], rows[:, 3], parent, at, ranges, np.asarray(axis, float),
-                flat_axis=np.asarray(flat_axis, float), **options,
+                kind,
+                rows[:, :3],
+                rows[:, 3],
+                parent,
+                at,
+                ranges,
+                np.asarray(axis, float),
+                flat_axis=np.asarray(flat_axis, float),
+                **options,
             )  # fmt: skip
         )
         return len(self.chains) - 1
