@@ -55,7 +55,7 @@ def is_held_out(traits: FloatArray) -> bool:
 
 
 def sample_traits(rng: np.random.Generator, *, held_out: bool = False) -> FloatArray:
-    """(2,) random traits in [0, 1], limb length and thickness, of training or held-out creatures."""
+    """(2,) random traits in [0, 1]: limb length and thickness."""
     while True:
         traits = rng.random(2)
         if is_held_out(traits) == held_out:
@@ -102,7 +102,8 @@ def sample_creature(
         )
         return Creature(skeleton, rest, surface.faces, weights)
     raise RuntimeError(
-        f"none of {_ATTEMPTS} skins of a {maker.__name__} was one closed surface with a good triangulation"
+        f"none of {_ATTEMPTS} skins of a {maker.__name__} was one closed surface that could be "
+        f"triangulated with {vertices[0]} to {vertices[1]} vertices"
     )
 
 

@@ -156,7 +156,7 @@ class Builder:
                 np.asarray(axis, float),
                 flat_axis=np.asarray(flat_axis, float),
                 **options,
-            )  # fmt: skip
+            )
         )
         return len(self.chains) - 1
 
@@ -194,3 +194,19 @@ class Builder:
             flat = max(chain.flat, min(1.0, 0.9 * THINNEST / float(np.median(radii))))
             scaled.append(replace(chain, points=chain.points * scale, radii=radii, flat=flat))
         return Skeleton(self.family, tuple(scaled))
+
+
+def mix(low: float, high: float, share: float) -> float:
+    """From low (share 0) to high (share 1)."""
+    return low + share * (high - low)
+
+
+def vector(x: float, y: float, z: float) -> FloatArray:
+    """(3,) of three numbers."""
+    return np.array([x, y, z], dtype=np.float64)
+
+
+def ahead(elevation: float) -> FloatArray:
+    """The direction forward (-Y), raised by degrees."""
+    angle = np.radians(elevation)
+    return np.array([0.0, -np.cos(angle), np.sin(angle)])
