@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from supple_training.bodies import HELD_OUT_GRID, self_intersection
 from supple_training.creatures.families import FAMILIES
-from supple_training.creatures.poses import follow, joint_motions, sample_turns
+from supple_training.creatures.poses import follow, joint_motions, sample_turns, stand
 from supple_training.creatures.skeleton import FloatArray, Skeleton
 from supple_training.creatures.skin import IntArray, skin, spread
 from supple_training.remesh import (
@@ -135,7 +135,7 @@ def sample_pose(
             and collapsed_share(rest, posed, faces) < 0.002
             and self_intersection(posed, faces) <= allowed
         ):
-            return posed
+            return stand(posed, rest, rng)
     raise RuntimeError(
         f"no pose out of {_ATTEMPTS} kept self intersection below {allowed:.3f}; "
         "widen intersection_limit or narrow the joint ranges"

@@ -121,7 +121,7 @@ def sprawler(limbs: float, thick: float, rng: Rng) -> Skeleton:
 def snake(limbs: float, thick: float, rng: Rng) -> Skeleton:
     """A snake, eel, worm, or one arm of something larger."""
     b = Builder("snake")
-    r = mix(0.03, 0.085, thick)
+    r = mix(0.045, 0.1, thick)
     length = mix(1.0, 1.5, limbs)
     curl, wave = rng.uniform(0, 0.12), rng.uniform(0.5, 2.0)
     t = np.linspace(0, 1, 7)
@@ -135,7 +135,7 @@ def snake(limbs: float, thick: float, rng: Rng) -> Skeleton:
         joints=16,
         x=(-160, 160),
         y=(-60, 60),
-        z=(-300, 300),
+        z=(-250, 250),
         axis=(1, 0.1, 0),
     )
     if rng.random() < 0.75:

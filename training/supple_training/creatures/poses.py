@@ -106,3 +106,14 @@ def follow(
     real, unreal = real / length, unreal / length
     shift = 2 * _multiply(unreal, real * np.array([-1, -1, -1, 1]))[:, :3]
     return Rotation.from_quat(real).apply(vertices) + shift
+
+
+def stand(posed: FloatArray, rest: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """A pose (n, 3) moved rigidly to fit the rest best, then leant and turned a little at random.
+
+    Without this, the chain's first joint stays where it is and the far end swings about it.
+    """
+    middle, rest_middle = posed.mean(axis=0), rest.mean(axis=0)
+    fit, _ = Rotation.align_vectors(rest - rest_middle, posed - middle)
+    lean = Rotation.from_rotvec(np.radians(rng.normal(0.0, [8.0, 5.0, 12.0])))
+    return (lean * fit).apply(posed - middle) + rest_middle
