@@ -30,7 +30,7 @@ def _limb(
         return free
     moment, reach = stride
     angle = 2 * np.pi * (moment + chain.phase)
-    turns = 0.15 * free
+    turns = 0.2 * free
     # Joints down the limb follow later in the stride.
     turns[:, 0] += reach * np.sin(angle + 0.9 * np.arange(k))
     return np.clip(turns, -1.0, 1.0)
@@ -38,8 +38,8 @@ def _limb(
 
 def sample_turns(skeleton: Skeleton, rng: np.random.Generator) -> FloatArray:
     """Random turns of all joints about their own x, y and z axes: (joints, 3) degrees."""
-    strong = rng.choice([0.25, 0.5, 0.8])
-    stride = (rng.random(), rng.uniform(0.4, 1.0)) if rng.random() < 0.5 else None
+    strong = rng.choice([0.35, 0.65, 0.95])
+    stride = (rng.random(), rng.uniform(0.5, 1.1)) if rng.random() < 0.5 else None
     turns = []
     for chain in skeleton.chains:
         if not chain.joints:

@@ -32,9 +32,9 @@ def quadruped(limbs: float, thick: float, rng: Rng) -> Skeleton:
         [(0, 0.5, 0), (0, 0.18, arch), (0, -0.18, arch), (0, -0.5, rise)],
         r * np.array([rng.uniform(0.8, 1.0), rng.uniform(0.8, 1.15), rng.uniform(0.9, 1.2), 0.85]),
         joints=6,
-        x=(-40, 50),
+        x=(-50, 65),
         y=(-25, 25),
-        z=(-45, 45),
+        z=(-60, 60),
         flat=flat,
     )
     length = rng.uniform(0.2, 0.5) if rng.random() < 0.6 else rng.uniform(0.5, 1.1)
@@ -53,7 +53,7 @@ def quadruped(limbs: float, thick: float, rng: Rng) -> Skeleton:
         -1,
         joints=6 if length < 0.6 else 9,
         flat=rng.uniform(0.75, 1.0),
-        x=(-60, 75),
+        x=(-75, 90),
         y=(-40, 40),
         z=(-75, 75),
     )
@@ -224,7 +224,7 @@ def biped(limbs: float, thick: float, rng: Rng) -> Skeleton:
         [-0.5 * way, np.zeros(3), 0.5 * way],
         [0.95 * r, r, 0.7 * r],
         joints=6,
-        x=(-40, 50),
+        x=(-50, 65),
         y=(-35, 35),
         z=(-35, 35),
         flat=rng.uniform(0.8, 1.1),
