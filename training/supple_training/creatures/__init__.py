@@ -26,6 +26,8 @@ from supple_training.remesh import (
 )
 
 _ATTEMPTS = 20
+_CREATURES = 5
+"""How many creatures a pair tries before it gives up: one bad draw must not end a long run."""
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,13 @@ def make_creature_pair(
 
     Raises RuntimeError when no good creature, triangulation or pose is found.
     """
-    creature = sample_creature(rng, held_out=held_out, vertices=vertices, family=family)
-    source = creature.vertices if at_rest else sample_pose(creature, rng)
-    target = sample_pose(creature, rng)
+    for left in reversed(range(_CREATURES)):
+        try:
+            creature = sample_creature(rng, held_out=held_out, vertices=vertices, family=family)
+            source = creature.vertices if at_rest else sample_pose(creature, rng)
+            target = sample_pose(creature, rng)
+            break
+        except RuntimeError:
+            if not left:
+                raise
     return source, creature.faces.astype(np.int32), target
