@@ -173,11 +173,11 @@ def report_table(measured: dict) -> Table:
 def main(
     signal: Annotated[Signal, typer.Argument(help="What the network starts from.")],
     out: Annotated[Path, typer.Option(help="The .safetensors file to write.")],
-    pairs: Annotated[int, typer.Option(min=1, help="Training pairs, one a step.")] = 60,
-    epochs: Annotated[int, typer.Option(min=1, help="Every pair once each.")] = 50,
+    pairs: Annotated[int, typer.Option(min=1, help="Training pairs, one a step.")] = 240,
+    epochs: Annotated[int, typer.Option(min=1, help="Every pair once each.")] = 40,
     seed: Annotated[int, typer.Option(min=0, help="Of the pairs, weights and draws.")] = 0,
     config: Annotated[Config, typer.Option(help="Form of the network.")] = Config.equivariant,
-    held_out: Annotated[int, typer.Option(min=1, help="Pairs to measure on.")] = 12,
+    held_out: Annotated[int, typer.Option(min=1, help="Pairs to measure on.")] = 24,
     data: Annotated[
         Path | None, typer.Option(help="Train on this .npz of pairs instead of new ones.")
     ] = None,
