@@ -115,7 +115,8 @@ def strip(case: EditCase, rows: dict[str, dict], poses: dict[str, NDArray], path
         ScalarMappable(norm, COLOURS), ax=list(grid[0]), extend="max", pad=0.01, aspect=28
     )
     colours.set_label("symmetric Dirichlet of a face", fontsize=9)
-    colours.ax.tick_params(labelsize=8)
+    ticks = norm.vmax * np.linspace(0, 1, 6) ** 2  # evenly spaced on this scale
+    colours.set_ticks(ticks, labels=[f"{tick:.2g}" for tick in ticks], fontsize=8)
     held = {_is_held(case, handle) for handle in case.handles}
     marks = [("held", HELD)] * (True in held) + [("moved", MOVED)] * (False in held)
     for place, (text, colour) in enumerate(marks):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-CHUNK = 2_000_000
+CHUNK = 400_000
 """Fragments at a time."""
 
 SAMPLES = 2
@@ -75,9 +75,14 @@ def _fragments(corners: NDArray, width: int, height: int):
     low = np.clip(np.ceil(corners.min(axis=1) - 0.5).astype(int), 0, [width, height])
     high = np.clip(np.floor(corners.max(axis=1) - 0.5).astype(int) + 1, 0, [width, height])
     span = np.maximum(high - low, 0)
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    doubled = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    (ax, ay), (bx, by), (cx, cy) = (corners[:, i].T for i in range(3))
+    doubled = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
     drawn = np.flatnonzero((span.prod(axis=1) > 0) & (doubled != 0))
+    # A corner's weight is a plane over the picture: at (x, y), plane . (x, y, 1).
+    planes = np.zeros((2, 3, len(corners)))
+    for plane, (px, py, qx, qy) in zip(planes, ((bx, by, cx, cy), (cx, cy, ax, ay)), strict=True):
+        parts = np.stack([py - qy, qx - px, px * qy - py * qx])
+        np.divide(parts, doubled, out=plane, where=doubled != 0)
     ends = np.cumsum(span[drawn].prod(axis=1))
     first = 0
     while first < len(drawn):
@@ -89,13 +94,11 @@ def _fragments(corners: NDArray, width: int, height: int):
         inside = np.arange(len(face)) - np.repeat(np.cumsum(counts) - counts, counts)
         row, column = np.divmod(inside, span[face, 0])
         x, y = column + low[face, 0], row + low[face, 1]
-        centre = np.stack([x, y], axis=1) + 0.5
-
-        def share(p, q, face=face, centre=centre):
-            d, e = q[face] - p[face], centre - p[face]
-            return (d[:, 0] * e[:, 1] - d[:, 1] * e[:, 0]) / doubled[face]
-
-        weights = np.stack([share(b, c), share(c, a), share(a, b)], axis=1)
+        first_two = [
+            right[face] * (x + 0.5) + down[face] * (y + 0.5) + start[face]
+            for right, down, start in planes
+        ]
+        weights = np.stack([*first_two, 1 - first_two[0] - first_two[1]], axis=1)
         kept = (weights >= 0).all(axis=1)
         yield face[kept], y[kept] * width + x[kept], weights[kept]
         first = last
