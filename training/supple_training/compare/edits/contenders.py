@@ -113,8 +113,11 @@ def _supple(bench: Bench, _: int, *, growing: tuple[str, ...] = (), **options: o
                 accepts(supple.Editor.solve, name, "Editor.solve")
             except NotAvailable:
                 continue
-            for count in CHECKPOINTS:  # each from the start: an Editor does not go on
-                yield (count, *timed(partial(call, **{name: count})))
+            try:
+                for count in CHECKPOINTS:  # each from the start: an Editor does not go on
+                    yield (count, *timed(partial(call, **{name: count})))
+            except supple.SuppleError:
+                continue  # another mode's option
             return
 
     prepare = bench.prepared.seconds

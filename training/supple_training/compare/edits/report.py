@@ -15,6 +15,7 @@ from rich.table import Table
 from supple_training.compare import machine
 from supple_training.compare.edits.contenders import ARAP, NATURAL
 from supple_training.compare.edits.measure import MEASURED, NEAR, Settings
+from supple_training.compare.edits.summary import MISSED
 from supple_training.compare.report import absence, seconds_text
 
 SCHEMA = "supple-edit-1"
@@ -282,4 +283,4 @@ def exit_code(made: dict) -> int:
         for case in made["measured"].values()
         for row in case["rows"].values()
     )
-    return int("missed" in words or failed or bool(made["errors"]))
+    return int(MISSED in words or failed or bool(made["errors"]))
