@@ -177,6 +177,14 @@ def test_what_cannot_be_had_is_reported_and_leaves_the_others_alone():
     assert found["good"]["handle_error"] == pytest.approx(lift)
 
 
+def test_growing_effort_is_tried_with_the_first_option_that_there_is(monkeypatch):
+    monkeypatch.setattr(contenders, "CHECKPOINTS", (1, 2, 4))
+    setup = partial(contenders._supple, mode="stiff", growing=("no_such_option", "passes"))
+    row = measured(torus_case(), [Contender("ours", setup, ours=True)])["ours"]
+    assert [iterations for iterations, *_ in row["trace"]] == [0, 1, 2, 4]
+    assert row["arap_energy"] == row["trace"][0][2]
+
+
 def test_a_planted_bad_result_ranks_last_and_misses_the_targets(rows):
     assert verdict(summary.summary(as_cases(rows), [contenders.STIFF]), "ours") == summary.MET
     noise = np.random.default_rng(5).normal(0, 0.05, TORUS.vertices.shape)

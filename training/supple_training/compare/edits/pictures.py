@@ -69,8 +69,7 @@ def _title(name: str, row: dict) -> str:
     if row.get("pose_error") is not None:
         lines[-1] += f", pose error {row['pose_error']:.3g}"
     bad = row["flipped_faces"]
-    if bad:
-        lines[-1] += f", {bad} face{'s' if bad > 1 else ''} turned"
+    lines.append(f"{bad} face{'s' if bad > 1 else ''} turned" if bad else "")
     return "\n".join(lines)
 
 
@@ -90,20 +89,20 @@ def strip(case: EditCase, rows: dict[str, dict], poses: dict[str, NDArray], path
         return render(points, faces, COLOURS(norm(values))[:, :3], view, width)
 
     images = [render(case.vertices, faces, handle_colours(case), view, width)]
-    titles = [f"rest, {len(case.handles)} handles\n"]
+    titles = [f"rest, {len(case.handles)} handles\n\n"]
     for (name, posed), values in zip(panels, distortions, strict=True):
         images.append(coloured(posed, values))
         titles.append(_title(name, rows[name]))
     for points, values in zip(truth, truth_distortion, strict=True):
         images.append(coloured(points, values))
         own = supple.symmetric_dirichlet(case.vertices, faces, points)
-        titles.append(f"truth\ndistortion {own:.3g}")
+        titles.append(f"truth\ndistortion {own:.3g}\n")
 
     dpi = 100
     height = images[0].shape[0]
     figure, grid = plt.subplots(
         *(1, len(images)),
-        figsize=((max(width, 280) * len(images) + 110) / dpi, (height + 110) / dpi),
+        figsize=((max(width, 280) * len(images) + 110) / dpi, (height + 125) / dpi),
         layout="constrained",
         squeeze=False,
     )
