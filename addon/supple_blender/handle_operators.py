@@ -122,20 +122,12 @@ class SUPPLE_OT_rebind(HandleOperator, bpy.types.Operator):
         return "INFO", f"{obj.name}: handles fit its {len(obj.data.vertices):,} vertices now"
 
 
-_CLASSES = (
-    SUPPLE_OT_handles_from_groups,
-    SUPPLE_OT_handle_remove,
-    SUPPLE_OT_handles_clear,
-    SUPPLE_OT_handle_select,
-    SUPPLE_OT_rebind,
+register, unregister = bpy.utils.register_classes_factory(
+    (
+        SUPPLE_OT_handles_from_groups,
+        SUPPLE_OT_handle_remove,
+        SUPPLE_OT_handles_clear,
+        SUPPLE_OT_handle_select,
+        SUPPLE_OT_rebind,
+    )
 )
-
-
-def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)

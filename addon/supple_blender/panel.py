@@ -96,7 +96,7 @@ class SUPPLE_PT_pose(_Sidebar, bpy.types.Panel):
         if body.handles and body.bound_vertices != len(obj.data.vertices):
             _draw_text(layout, f"It had {body.bound_vertices:,} vertices before", "ERROR")
             layout.operator(SUPPLE_OT_rebind.bl_idname)
-        layout.row().prop(body, "mode", expand=True)
+        layout.prop(body, "stiffness", slider=True)
         self._draw_key(layout, obj)
 
     def _draw_key(self, layout, obj):
@@ -113,14 +113,6 @@ class SUPPLE_PT_pose(_Sidebar, bpy.types.Panel):
             layout.prop(obj.supple, "overwrite", text=f"Overwrite '{name}'")
 
 
-_CLASSES = (SUPPLE_UL_handles, SUPPLE_PT_mesh, SUPPLE_PT_pose)
-
-
-def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(
+    (SUPPLE_UL_handles, SUPPLE_PT_mesh, SUPPLE_PT_pose)
+)

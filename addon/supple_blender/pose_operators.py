@@ -167,15 +167,15 @@ class SUPPLE_OT_check_mesh(bpy.types.Operator):
             self.layout.label(text=line, icon="DOT")
 
 
-_CLASSES = (SUPPLE_OT_prepare, SUPPLE_OT_solve, SUPPLE_OT_bake, SUPPLE_OT_check_mesh)
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(
+    (SUPPLE_OT_prepare, SUPPLE_OT_solve, SUPPLE_OT_bake, SUPPLE_OT_check_mesh)
+)
 
 
 def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
+    _register_classes()
 
 
 def unregister():
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+    _unregister_classes()
     prepared.clear()

@@ -6,19 +6,22 @@ from bpy.props import (
     BoolProperty,
     CollectionProperty,
     EnumProperty,
+    FloatProperty,
     FloatVectorProperty,
     IntProperty,
     PointerProperty,
     StringProperty,
 )
 
+from .groups import MIN_WEIGHT
+
 KINDS = (
-    ("MOVED", "Moved", "Follows its Empty"),
+    ("MOVED", "Moved", "Follows its Empty or bone"),
     ("HELD", "Held", "Stays where the rest shape has it"),
 )
-MODES = (
-    ("NATURAL", "Natural", "Bends as bodies do"),
-    ("STIFF", "Stiff", "Keeps every part as rigid as it can"),
+METHODS = (
+    ("SUPPLE", "Supple", "What was learned from bodies, and as stiff as the slider says"),
+    ("ARAP", "As Rigid As Possible", "The classic, to compare; the slider does not count"),
 )
 
 
@@ -41,6 +44,15 @@ class SUPPLE_PG_handle(bpy.types.PropertyGroup):
         description="The Empty's matrix at rest in the mesh's local coordinates, row by row",
         size=16,
     )
+    armature: PointerProperty(name="Armature", type=bpy.types.Object)
+    bone: StringProperty(name="Bone", description="The bone that moves it, in place of an Empty")
+    least: FloatProperty(
+        name="Least Weight",
+        description="Vertices with at least this weight in the group are in the handle",
+        default=MIN_WEIGHT,
+        min=0.0,
+        max=1.0,
+    )
 
 
 class SUPPLE_PG_key(bpy.types.PropertyGroup):
@@ -62,7 +74,33 @@ class SUPPLE_PG_body(bpy.types.PropertyGroup):
     made_basis: BoolProperty(
         name="Made Basis", description="Supple added the Basis, for its preview alone"
     )
-    mode: EnumProperty(name="Mode", items=MODES, default="NATURAL")
+    stiffness: FloatProperty(
+        name="Stiffness",
+        description="From natural, which bends as bodies do, to stiff, which keeps every part as "
+        "rigid as it can",
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+    method: EnumProperty(name="Method", items=METHODS, default="SUPPLE")
+    strength: FloatProperty(
+        name="Strength",
+        description="How much of the pose is taken: 0 leaves the rest shape",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+    mask: StringProperty(
+        name="Mask",
+        description="Vertex group whose weights say how much of the pose each vertex takes",
+    )
+    falloff: FloatProperty(
+        name="Falloff",
+        description="Distance from the moved handles at which nothing moves; 0: everywhere",
+        min=0.0,
+        subtype="DISTANCE",
+    )
     network: BoolProperty(
         name="Learned Detail",
         description="Use what was learned from bodies; off compares with the plain solve",
@@ -77,16 +115,16 @@ class SUPPLE_PG_body(bpy.types.PropertyGroup):
     )
 
 
-_CLASSES = (SUPPLE_PG_handle, SUPPLE_PG_key, SUPPLE_PG_body)
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(
+    (SUPPLE_PG_handle, SUPPLE_PG_key, SUPPLE_PG_body)
+)
 
 
 def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
+    _register_classes()
     bpy.types.Object.supple = PointerProperty(type=SUPPLE_PG_body)
 
 
 def unregister():
     del bpy.types.Object.supple
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+    _unregister_classes()

@@ -49,6 +49,11 @@ def solve_stretch(world, name):
     return np.eye(3) if np.abs(stretch - np.eye(3)).max() < 2e-5 else stretch
 
 
+def uniform_scale(world):
+    """Return how many world units one unit of solve space is."""
+    return float(np.cbrt(abs(np.linalg.det(world[:3, :3]))))
+
+
 def to_solve_points(stretch, points):
     """Map local points (n, 3) to solve space."""
     return points @ stretch.T
