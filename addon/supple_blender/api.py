@@ -13,7 +13,7 @@ then `CancelledError` is raised, and again nothing was changed. Call them from t
 
 import bpy
 
-from . import groups, handles, mesh_data, motions, native, pose, shape_keys, space
+from . import collecting, handles, mesh_data, motions, native, pose, shape_keys
 from .errors import CancelledError, UserError, count
 from .stages import Stages
 
@@ -60,31 +60,8 @@ def prepare(obj, stages=None):
 
 def collect_pose(obj):
     """Return the `pose.PoseInput` of obj: its rest shape and where its handles are now."""
-    mesh_data.require_writable(obj)
-    place = motions.Place.of(bpy.context)
-    world = place.world_matrix(obj)
-    return pose.PoseInput(
-        rest=mesh_data.collect(obj, world),
-        motions=motions.collect(place, obj, world, motions.vertices_of(obj)),
-        options=options_of(obj),
-        blend=blend_of(obj, world),
-    )
-
-
-def options_of(obj):
-    """Return the `pose.Options` set on obj."""
-    body = obj.supple
-    return pose.Options(stiffness=body.stiffness, method=body.method.lower(), network=body.network)
-
-
-def blend_of(obj, world):
-    """Return the `pose.Blend` set on obj, whose evaluated world matrix is `world`."""
-    body = obj.supple
-    return pose.Blend(
-        strength=body.strength,
-        mask=groups.weights(obj, body.mask) if body.mask else None,
-        falloff=body.falloff / space.uniform_scale(world),
-    )
+    mesh_data.require_mesh(obj)
+    return collecting.collect_pose(motions.Place.of(bpy.context), obj)
 
 
 def solve(obj, stages=None):

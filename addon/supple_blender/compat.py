@@ -47,6 +47,11 @@ def new_world(name):
     return world
 
 
+def is_rendering():
+    """Return whether a render runs: it reads the scene from another thread."""
+    return bpy.app.is_job_running("RENDER")
+
+
 def draw_progress(layout, fraction, text):
     """Draw a progress bar, or its text where Blender has no bar (before 4.0)."""
     if hasattr(layout, "progress"):

@@ -4,7 +4,7 @@
 import bpy
 from bpy.props import StringProperty
 
-from . import handles, shape_keys
+from . import distortion, handles, live, shape_keys
 from .errors import UserError, count, some
 from .pose_operators import active_body
 
@@ -82,7 +82,11 @@ class SUPPLE_OT_handles_clear(HandleOperator, bpy.types.Operator):
     bl_label = "Clear"
 
     def change(self, context, obj):
+        if live.is_live(obj):
+            live.end(keep=True)
         shape_keys.remove_preview(obj)
+        if distortion.is_shown(obj):
+            distortion.refresh(context, obj)
         handles.clear(obj)
         return "INFO", f"{obj.name}: handles removed"
 

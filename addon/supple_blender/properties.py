@@ -109,6 +109,8 @@ class SUPPLE_PG_body(bpy.types.PropertyGroup):
     key_name: StringProperty(
         name="Shape Key", description="The shape key that Bake writes", default="Pose 1"
     )
+    colour_before: StringProperty(description="The colour attribute shown before the distortion")
+    shading_before: StringProperty(description="The viewport's colours before the distortion")
     overwrite: BoolProperty(
         name="Overwrite",
         description="Let the next Bake write over a key that Supple did not make",
