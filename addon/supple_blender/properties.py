@@ -13,6 +13,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from . import distortion
 from .groups import MIN_WEIGHT
 
 KINDS = (
@@ -117,16 +118,39 @@ class SUPPLE_PG_body(bpy.types.PropertyGroup):
     )
 
 
+def _constant(value):
+    return lambda _self: value
+
+
+class SUPPLE_PG_legend(bpy.types.PropertyGroup):
+    """What the colours of the distortion mean, drawn as swatches that can't be changed."""
+
+    __annotations__ = {
+        f"colour_{index}": FloatVectorProperty(
+            name=f"Distortion {level:g}",
+            description="The sum of squared stretches and their inverses, less that at rest",
+            size=3,
+            subtype="COLOR",
+            get=_constant(colour),
+        )
+        for index, (level, colour) in enumerate(
+            zip(distortion.LEVELS, distortion.COLOURS.tolist(), strict=True)
+        )
+    }
+
+
 _register_classes, _unregister_classes = bpy.utils.register_classes_factory(
-    (SUPPLE_PG_handle, SUPPLE_PG_key, SUPPLE_PG_body)
+    (SUPPLE_PG_handle, SUPPLE_PG_key, SUPPLE_PG_body, SUPPLE_PG_legend)
 )
 
 
 def register():
     _register_classes()
     bpy.types.Object.supple = PointerProperty(type=SUPPLE_PG_body)
+    bpy.types.WindowManager.supple_legend = PointerProperty(type=SUPPLE_PG_legend)
 
 
 def unregister():
+    del bpy.types.WindowManager.supple_legend
     del bpy.types.Object.supple
     _unregister_classes()
