@@ -14,6 +14,13 @@ def _names(text):
     return [name.strip() for name in text.split(",") if name.strip()]
 
 
+def _keep_active(context, obj):
+    """Make obj the active object where that was an Empty that is gone now."""
+    if context.view_layer.objects.active is None and obj.name in context.view_layer.objects:
+        context.view_layer.objects.active = obj
+        obj.select_set(True)
+
+
 class HandleOperator:
     """Mixin: `change` does the work and returns the message; its UserError becomes a report."""
 
@@ -151,6 +158,7 @@ class SUPPLE_OT_handle_remove(HandleOperator, bpy.types.Operator):
         index = obj.supple.active_handle
         name = self.name or (rows[index].name if 0 <= index < len(rows) else "")
         handles.remove(obj, name)
+        _keep_active(context, obj)
         return "INFO", f"{obj.name}: handle '{name}' removed"
 
 
@@ -167,6 +175,7 @@ class SUPPLE_OT_handles_clear(HandleOperator, bpy.types.Operator):
         if distortion.is_shown(obj):
             distortion.refresh(context, obj)
         handles.clear(obj)
+        _keep_active(context, obj)
         return "INFO", f"{obj.name}: handles removed"
 
 

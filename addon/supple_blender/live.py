@@ -108,15 +108,19 @@ class Follower:
             raise LostError(f"{self.name}: it is gone, so Live ended.")
         if shape_keys.find(obj, shape_keys.PREVIEW) is None:
             raise LostError(f"{self.name}: its key '{shape_keys.PREVIEW}' is gone: Live ended.")
-        if (
-            self._paused
-            and obj.mode == "OBJECT"
-            and not shape_keys.is_ours(obj, shape_keys.PREVIEW)
-        ):
+        if self._paused and obj.mode == "OBJECT" and self._was_edited(obj):
             raise LostError(
                 f"{self.name}: key '{shape_keys.PREVIEW}' was edited, so Live ended and left it."
             )
         return obj
+
+    def _was_edited(self, obj):
+        """Return whether someone changed the preview itself; an edited Basis takes it along."""
+        return not shape_keys.is_ours(obj, shape_keys.PREVIEW) and self._has_same_rest(obj)
+
+    def _has_same_rest(self, obj):
+        known = self._warm and self._warm.rest.positions
+        return known is not None and np.array_equal(mesh_data.rest_positions(obj), known)
 
     def _aim(self, place, obj):
         """Give the solver what changed; return whether something did."""
@@ -165,9 +169,8 @@ class Follower:
         if self._paused or (self._warm.settled and now - self._checked > CHECK_SECONDS):
             self._checked = now
             was_paused, self._paused = self._paused, False
-            rest = mesh_data.rest_positions(obj)
             # In other modes a group may have changed without a trace in the shape.
-            return was_paused or not np.array_equal(rest, self._warm.rest.positions)
+            return was_paused or not self._has_same_rest(obj)
         return False
 
     def make(self, place, obj, wait):

@@ -94,6 +94,10 @@ class SUPPLE_PT_pose(_Sidebar, bpy.types.Panel):
         body = obj.supple
         row = layout.row()
         row.template_list("SUPPLE_UL_handles", "", body, "handles", body, "active_handle", rows=4)
+        column = row.column(align=True)
+        column.operator(SUPPLE_OT_handle_remove.bl_idname, text="", icon="REMOVE")
+        column.separator()
+        column.operator(SUPPLE_OT_handles_clear.bl_idname, text="", icon="X")
         self._draw_sources(layout)
         if body.handles and body.bound_vertices != len(obj.data.vertices):
             _draw_text(layout, f"It had {body.bound_vertices:,} vertices before", "ERROR")
@@ -107,20 +111,17 @@ class SUPPLE_PT_pose(_Sidebar, bpy.types.Panel):
         row = column.row(align=True)
         row.operator(SUPPLE_OT_handles_from_groups.bl_idname, icon="ADD")
         row.operator(SUPPLE_OT_handles_from_selection.bl_idname, icon="ADD")
-        row.operator(SUPPLE_OT_handles_from_bones.bl_idname, icon="ADD")
         row = column.row(align=True)
-        row.operator(SUPPLE_OT_propose_handles.bl_idname, text="Propose 12").count = 12
-        row.operator(SUPPLE_OT_handle_remove.bl_idname, text="", icon="REMOVE")
-        row.operator(SUPPLE_OT_handles_clear.bl_idname, icon="X")
+        row.operator(SUPPLE_OT_handles_from_bones.bl_idname, icon="ADD")
+        row.operator(SUPPLE_OT_propose_handles.bl_idname, text="Propose 12", icon="ADD").count = 12
 
     def _draw_look(self, layout, body):
-        row = layout.row(align=True)
+        row = layout.split(factor=0.3)
         row.active = body.method == "SUPPLE"
         row.label(text="Natural")
+        row = row.split(factor=0.74)
         row.prop(body, "stiffness", text="", slider=True)
-        label = row.row()
-        label.alignment = "RIGHT"
-        label.label(text="Stiff")
+        row.label(text="Stiff")
         layout.prop(body, "strength", slider=True)
 
     def _draw_live(self, layout, obj):
@@ -134,7 +135,7 @@ class SUPPLE_PT_pose(_Sidebar, bpy.types.Panel):
         preview.operator(SUPPLE_OT_solve.bl_idname)
         if is_live:
             layout.label(text=live.running.doing, icon="INFO")
-            layout.label(text="Enter keeps the pose, Esc takes it back", icon="BLANK1")
+            layout.label(text="Enter keeps, Esc takes back")
             if live.running.problem:
                 _draw_text(layout, live.running.problem, "ERROR")
         elif live.ended:
@@ -171,7 +172,7 @@ class SUPPLE_PT_look(_PoseSettings, bpy.types.Panel):
         layout.prop(obj.supple, "method")
         row = layout.row()
         row.active = obj.supple.method == "SUPPLE"
-        row.prop(obj.supple, "network")
+        row.prop(obj.supple, "network", text="Learned")
 
 
 class SUPPLE_PT_distortion(_PoseSettings, bpy.types.Panel):
