@@ -139,7 +139,7 @@ def test_a_preview_edited_by_hand_is_left_alone(bar, live):
     assert np.isclose(preview(bar)[:, 2].max(), bodies.HEIGHT + 0.5 + 3, atol=1e-4)
 
 
-def test_a_changed_vertex_count_is_said_and_rebind_goes_on(bar, live, monkeypatch):
+def test_a_changed_vertex_count_is_said_and_rebind_goes_on(bar, live, addon, monkeypatch):
     bpy.ops.supple.live()
     move_head(0.5)
     bar.active_shape_key_index = 0
@@ -147,7 +147,7 @@ def test_a_changed_vertex_count_is_said_and_rebind_goes_on(bar, live, monkeypatc
     live.step(12.0)
     assert "Press Rebind to go on" in live.running.problem
     bpy.ops.supple.rebind()
-    monkeypatch.setattr(live, "CHECK_SECONDS", 0.0)
+    monkeypatch.setattr(addon("follower"), "CHECK_SECONDS", 0.0)
     settle(live)
     assert live.running.problem == ""
     assert np.allclose(head_moved(bar), [0, 0, 0.5], atol=1e-5)

@@ -76,10 +76,10 @@ def show(context, obj):
     distortions = at_vertices(rest, _seen(obj))
     mesh_data.leave_mode(obj)
     attributes = obj.data.color_attributes
-    active = attributes.active_color_index
+    active = attributes.active_color.name if attributes.active_color else ""
     attributes.new(ATTRIBUTE, "FLOAT_COLOR", "POINT")
-    if len(attributes) > 1:
-        attributes.active_color_index = active
+    if active:
+        attributes.active_color = attributes[active]
     attributes[ATTRIBUTE].data.foreach_set("color", colours(distortions).ravel())
     obj.data.update()
 

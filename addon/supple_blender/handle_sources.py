@@ -79,12 +79,9 @@ def _armature(obj):
     return found[0] if found else None
 
 
-def _bone_names(context, obj, armature, wanted):
+def _bone_names(obj, armature, wanted):
     """Return the bones meant: the wanted, else the selected in Pose Mode, else all with a group."""
     bones = armature.pose.bones
-    missing = [name for name in wanted if name not in bones]
-    if missing:
-        raise UserError(f"{obj.name}: '{armature.name}' has no bone {some(missing)}.")
     if wanted:
         return wanted
     if armature.mode == "POSE":
@@ -122,7 +119,10 @@ def from_bones(context, obj, armature, names=(), held=()):
         raise UserError(
             f"{obj.name}: it has no armature. Add an Armature modifier, or select an armature too."
         )
-    names = _bone_names(context, obj, armature, list(dict.fromkeys([*names, *held])))
+    missing = [name for name in (*names, *held) if name not in armature.pose.bones]
+    if missing:
+        raise UserError(f"{obj.name}: '{armature.name}' has no bone {some(missing)}.")
+    names = list(dict.fromkeys([*_bone_names(obj, armature, names), *held]))
     new = [name for name in names if name not in obj.supple.handles]
     least = dict.fromkeys(new, BONE_WEIGHT)
     found = groups.members(obj, new, least)

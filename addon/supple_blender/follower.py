@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Following the handles of one body, a call at a time; `live` makes the calls.
+
+Objects are looked up by name each time, as undo replaces them.
+"""
+
+import time
+
+import bpy
+import numpy as np
+
+from . import (
+    collecting,
+    distortion,
+    mesh_data,
+    motions,
+    shape_keys,
+    snapshot,
+    space,
+)
+from .background import Worker
+from .errors import UserError
+from .stages import Stages
+from .warm import Warm
+
+# A prepared mesh is made for a scale; while that is being dragged, making one would be for nothing.
+REST_SECONDS = 0.3
+# How often the rest shape is compared, and something that failed is tried again.
+CHECK_SECONDS = 1.0
+
+
+class LostError(Exception):
+    """Live can't go on: undo, the user or a script removed what it writes to."""
+
+
+def _bones(obj):
+    """Return what decides which vertices are whose, to compare."""
+    return [(row.name, row.bone, row.least) for row in obj.supple.handles]
+
+
+def _settings(obj, world):
+    """Return what decides how the handles' motions become a pose, to compare."""
+    body = obj.supple
+    look = (body.stiffness, body.method, body.network, body.strength, body.mask, body.falloff)
+    return look, round(space.uniform_scale(world), 6), [row.kind for row in body.handles]
+
+
+class Follower:
+    """Follows the handles of one body. `problem` and `doing` are for the panel."""
+
+    def __init__(self, name, before):
+        self.name = name
+        self.before = before
+        self.problem = ""
+        self.stages = None
+        self._worker = None
+        self._warm = None
+        self._vertices = {}
+        self._made_for = self._settings = self._matrices = None
+        self._paused = False
+        self._checked = self._stretched = self._failed = 0.0
+        self._stretch = None
+
+    @property
+    def doing(self):
+        """Return what goes on, in a few words."""
+        if self._paused:
+            return f"Paused: {self.name} is not in Object Mode"
+        if self._worker:
+            return self.stages.doing() or "Preparing"
+        return "Following" if not self._warm or self._warm.settled else "Refining"
+
+    def follow(self, place, milliseconds, only_moved):
+        """Bring the mesh up to date; return whether there is more to do soon.
+
+        only_moved: leave refining to another call. Raises LostError.
+        """
+        obj = self._body()
+        if obj.mode != "OBJECT":
+            self._paused = True
+            return False
+        try:
+            moved = self._aim(place, obj)
+            if self._warm and (moved or not (only_moved or self._warm.settled)):
+                self._write(obj, self._warm.advance(milliseconds))
+        except UserError as error:
+            self._failed = time.monotonic()
+            self.problem = str(error)
+            return False
+        return bool(self._worker) or (self._warm is not None and not self._warm.settled)
+
+    def stop(self):
+        """End preparing, if it still runs."""
+        if self._worker:
+            self.stages.cancel()
+            self._worker.wait()
+
+    def _body(self):
+        obj = snapshot.body(self.name)
+        if obj is None:
+            raise LostError(f"{self.name}: it is gone, so Live ended.")
+        if shape_keys.find(obj, shape_keys.PREVIEW) is None:
+            raise LostError(f"{self.name}: its key '{shape_keys.PREVIEW}' is gone: Live ended.")
+        if self._paused and obj.mode == "OBJECT" and self._was_edited(obj):
+            raise LostError(
+                f"{self.name}: key '{shape_keys.PREVIEW}' was edited, so Live ended and left it."
+            )
+        return obj
+
+    def _was_edited(self, obj):
+        """Return whether someone changed the preview itself; an edited Basis takes it along."""
+        return not shape_keys.is_ours(obj, shape_keys.PREVIEW) and self._has_same_rest(obj)
+
+    def _has_same_rest(self, obj):
+        known = self._warm and self._warm.rest.positions
+        return known is not None and np.array_equal(mesh_data.rest_positions(obj), known)
+
+    def _aim(self, place, obj):
+        """Give the solver what changed; return whether something did."""
+        if self._worker:
+            return self._adopt()
+        world = place.world_matrix(obj)
+        if self._is_outdated(obj, world):
+            self.make(place, obj, wait=bpy.app.background)
+            return self._warm is not None
+        if self._warm is None:
+            return False
+        found = motions.collect(place, obj, world, self._vertices)
+        matrices = [motion.matrix for motion in found]
+        settings = _settings(obj, world)
+        self._failed, self.problem = 0.0, ""
+        if settings != self._settings:
+            blend = collecting.blend_of(obj, world)
+            self._warm.set(collecting.options_of(obj), blend, found)
+        elif self._same(matrices):
+            return False
+        else:
+            self._warm.aim(found)
+        self._settings, self._matrices = settings, matrices
+        return True
+
+    def _same(self, matrices):
+        return all(
+            (one is None and other is None) or np.array_equal(one, other)
+            for one, other in zip(matrices, self._matrices, strict=True)
+        )
+
+    def _is_outdated(self, obj, world):
+        """Return whether the solver is to be made (anew): the mesh, its scale or its handles."""
+        now = time.monotonic()
+        if now - self._failed < CHECK_SECONDS and self._failed:
+            return False
+        if self._warm is None or self._made_for != _bones(obj):
+            return True
+        if len(obj.data.vertices) != len(self._warm.rest.positions):
+            return True
+        stretch = space.solve_stretch(world, self.name)
+        if not np.array_equal(stretch, self._warm.rest.stretch):
+            if not np.array_equal(stretch, self._stretch):
+                self._stretch, self._stretched = stretch, now
+            return bpy.app.background or now - self._stretched > REST_SECONDS
+        if self._paused or (self._warm.settled and now - self._checked > CHECK_SECONDS):
+            self._checked = now
+            was_paused, self._paused = self._paused, False
+            # In other modes a group may have changed without a trace in the shape.
+            return was_paused or not self._has_same_rest(obj)
+        return False
+
+    def make(self, place, obj, wait):
+        """Make the solver for obj as it is, on a thread or, with wait, at once."""
+        self._paused, self._warm = False, None
+        inputs = collecting.collect_pose(place, obj)
+        self._made_for, self._settings = _bones(obj), _settings(obj, place.world_matrix(obj))
+        self._vertices = {motion.name: motion.vertices for motion in inputs.motions}
+        self._matrices = [motion.matrix for motion in inputs.motions]
+        stages = self.stages = Stages()
+        self._worker = Worker(lambda stages: Warm(inputs, stages), stages)
+        if wait:
+            self._worker.wait()
+            self._adopt()
+
+    def _adopt(self):
+        """Take what the worker made, if it is done; return whether it is."""
+        if self._worker.is_alive():
+            return False
+        worker, self._worker = self._worker, None
+        self._warm = worker.result()
+        self._failed, self.problem = 0.0, ""
+        return True
+
+    def _write(self, obj, positions):
+        shape_keys.rewrite(obj, shape_keys.PREVIEW, positions)
+        if distortion.is_shown(obj):
+            distortion.update(obj, self._warm.rest, positions)
