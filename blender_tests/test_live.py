@@ -185,6 +185,14 @@ def test_another_body_takes_over(bar, live):
     assert np.allclose(head_moved(bar), [0, 0, 0.5], atol=1e-5)
 
 
+def test_it_starts_from_edit_mode(bar, live):
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.data.objects["head"].location.z = 0.4
+    bpy.ops.supple.live()
+    assert bar.mode == "OBJECT"
+    assert np.allclose(head_moved(bar), [0, 0, 0.4], atol=1e-5)
+
+
 def test_bake_while_live_writes_the_pose_and_ends_it(bar, live):
     bpy.ops.supple.live()
     move_head(0.5)

@@ -17,6 +17,7 @@ from . import (
     shape_keys,
     snapshot,
     space,
+    status,
 )
 from .background import Worker
 from .errors import UserError
@@ -38,11 +39,18 @@ def _bones(obj):
     return [(row.name, row.bone, row.least) for row in obj.supple.handles]
 
 
-def _settings(obj, world):
-    """Return what decides how the handles' motions become a pose, to compare."""
+def _blend_settings(obj, world):
+    """Return what decides how much of a pose is taken where, to compare."""
     body = obj.supple
-    look = (body.stiffness, body.method, body.network, body.strength, body.mask, body.falloff)
-    return look, round(space.uniform_scale(world), 6), [row.kind for row in body.handles]
+    scale = round(space.uniform_scale(world), 6)
+    return body.strength, body.mask, body.falloff, scale, [row.kind for row in body.handles]
+
+
+def _equal(one, other):
+    """Return whether two settings, or two lists of matrices or None, are equal."""
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(np.array_equal, one, other))
+    return one == other
 
 
 class Follower:
@@ -56,7 +64,7 @@ class Follower:
         self._worker = None
         self._warm = None
         self._vertices = {}
-        self._made_for = self._settings = self._matrices = None
+        self._made_for = self._options = self._blend = self._matrices = None
         self._paused = False
         self._checked = self._stretched = self._failed = 0.0
         self._stretch = None
@@ -126,24 +134,27 @@ class Follower:
         if self._warm is None:
             return False
         found = motions.collect(place, obj, world, self._vertices)
-        matrices = [motion.matrix for motion in found]
-        settings = _settings(obj, world)
         self._failed, self.problem = 0.0, ""
-        if settings != self._settings:
-            blend = collecting.blend_of(obj, world)
-            self._warm.set(collecting.options_of(obj), blend, found)
-        elif self._same(matrices):
-            return False
-        else:
-            self._warm.aim(found)
-        self._settings, self._matrices = settings, matrices
-        return True
+        options, blend = collecting.options_of(obj), _blend_settings(obj, world)
+        matrices = [motion.matrix for motion in found]
+        seen = [
+            self._changes("_options", options, lambda: self._warm.set_options(options)),
+            self._changes(
+                "_blend",
+                blend,
+                lambda: self._warm.set_blend(collecting.blend_of(obj, world), found),
+            ),
+            self._changes("_matrices", matrices, lambda: self._warm.aim(found)),
+        ]
+        return any(seen)
 
-    def _same(self, matrices):
-        return all(
-            (one is None and other is None) or np.array_equal(one, other)
-            for one, other in zip(matrices, self._matrices, strict=True)
-        )
+    def _changes(self, name, new, act):
+        """Call `act` if attribute `name` is not `new` yet; return whether it was."""
+        if _equal(getattr(self, name), new):
+            return False
+        act()
+        setattr(self, name, new)
+        return True
 
     def _is_outdated(self, obj, world):
         """Return whether the solver is to be made (anew): the mesh, its scale or its handles."""
@@ -170,7 +181,8 @@ class Follower:
         """Make the solver for obj as it is, on a thread or, with wait, at once."""
         self._paused, self._warm = False, None
         inputs = collecting.collect_pose(place, obj)
-        self._made_for, self._settings = _bones(obj), _settings(obj, place.world_matrix(obj))
+        self._made_for, self._options = _bones(obj), inputs.options
+        self._blend = _blend_settings(obj, place.world_matrix(obj))
         self._vertices = {motion.name: motion.vertices for motion in inputs.motions}
         self._matrices = [motion.matrix for motion in inputs.motions]
         stages = self.stages = Stages()
@@ -186,6 +198,8 @@ class Follower:
         worker, self._worker = self._worker, None
         self._warm = worker.result()
         self._failed, self.problem = 0.0, ""
+        mesh = self._warm.mesh
+        status.remember(self._warm.rest, mesh.seconds, [note.message for note in mesh.notes])
         return True
 
     def _write(self, obj, positions):

@@ -130,7 +130,9 @@ def _shown():
 
 @bpy.app.handlers.persistent
 def _on_load(*_):
+    global _busy
     forget()
+    _busy = False
 
 
 @bpy.app.handlers.persistent

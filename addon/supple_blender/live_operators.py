@@ -46,7 +46,7 @@ class SUPPLE_OT_live_keep(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return live.running is not None and not _is_playing(context)
+        return live.running is not None
 
     def execute(self, context):
         name = live.running.name

@@ -16,7 +16,12 @@ from .handle_operators import (
     SUPPLE_OT_propose_handles,
     SUPPLE_OT_rebind,
 )
-from .live_operators import SUPPLE_OT_distortion, SUPPLE_OT_distortion_view, SUPPLE_OT_live
+from .live_operators import (
+    SUPPLE_OT_distortion,
+    SUPPLE_OT_distortion_view,
+    SUPPLE_OT_live,
+    SUPPLE_OT_live_keep,
+)
 from .pose_operators import (
     SUPPLE_OT_bake,
     SUPPLE_OT_check_mesh,
@@ -128,8 +133,9 @@ class SUPPLE_PT_pose(_Sidebar, bpy.types.Panel):
         is_live = live.is_live(obj)
         row = layout.row(align=True)
         row.scale_y = 1.3
+        button = SUPPLE_OT_live_keep if is_live else SUPPLE_OT_live
         icon = "PAUSE" if is_live else "PLAY"
-        row.operator(SUPPLE_OT_live.bl_idname, icon=icon, depress=is_live)
+        row.operator(button.bl_idname, text="Live", icon=icon, depress=is_live)
         preview = row.row(align=True)
         preview.enabled = not is_live
         preview.operator(SUPPLE_OT_solve.bl_idname)

@@ -112,7 +112,7 @@ def editor(rest, prepared_mesh, handles, model, stages, share):
         progress = stages.begin("Binding handles", share)
         other = _editors.latest(lambda kept: (kept[0], kept[2]) == (rest.digest, model))
         if hasattr(other, "rebind"):
-            found = other.rebind(handles)
+            found = other.rebind(handles, progress=progress)
         else:
             found = native.supple().Editor(prepared_mesh, handles, model=model, progress=progress)
         _editors.put(key, found)

@@ -15,41 +15,49 @@ class Warm:
     def __init__(self, pose_input, stages):
         self.rest = pose_input.rest
         self._input = pose_input
+        self._vertices = None
         pose.guarded(self.rest.name, lambda: self._bind(stages))
 
     def _bind(self, stages):
         handles = pose.native_handles(self.rest, self._input.motions)
         self.mesh = prepared.mesh(self.rest, stages, share=0.8)
         self._editor = prepared.editor(self.rest, self.mesh, handles, pose.MODEL, stages, share=0.2)
-        self._start(self._input)
+        self._start()
+        self._weigh()
 
-    def _start(self, pose_input):
-        self._session = live_solver.session(self._editor, pose_input.options)
-        self._weigh(pose_input)
-
-    def _weigh(self, pose_input):
-        self._input = pose_input
-        self._weights = pose.blend_weights(self.mesh, pose_input.motions, pose_input.blend)
+    def _start(self):
+        self._session = live_solver.session(self._editor, self._input.options)
         self._aim()
 
     def _aim(self):
         self._session.aim(pose.native_handles(self.rest, self._input.motions))
+        self._vertices = None
 
-    def set(self, options, blend, motions):
-        """Go on with other options, another blend, or handles held that were moved."""
-        new = replace(self._input, options=options, blend=blend, motions=motions)
-        start = self._weigh if options == self._input.options else self._start
-        pose.guarded(self.rest.name, lambda: start(new))
+    def _weigh(self):
+        self._weights = pose.blend_weights(self.mesh, self._input.motions, self._input.blend)
+
+    def _change(self, then, **fields):
+        self._input = replace(self._input, **fields)
+        pose.guarded(self.rest.name, then)
+
+    def set_options(self, options):
+        """Go on with other `live_solver.Options`."""
+        self._change(self._start, options=options)
+
+    def set_blend(self, blend, motions):
+        """Take another part of the same pose; motions say which handles are moved."""
+        self._change(self._weigh, blend=blend, motions=motions)
 
     def aim(self, motions):
         """Give the same handles, in the same order, new motions."""
-        self._input = replace(self._input, motions=motions)
-        pose.guarded(self.rest.name, self._aim)
+        self._change(self._aim, motions=motions)
 
     def advance(self, milliseconds):
         """Work for about this long and return the pose so far, local positions (n, 3) float64."""
-        vertices = pose.guarded(self.rest.name, lambda: self._session.advance(milliseconds))
-        return pose.to_local(self.rest, vertices, self._input.blend.strength, self._weights)
+        if self._vertices is None or not self.settled:
+            advance = self._session.advance
+            self._vertices = pose.guarded(self.rest.name, lambda: advance(milliseconds))
+        return pose.to_local(self.rest, self._vertices, self._input.blend.strength, self._weights)
 
     @property
     def settled(self):

@@ -54,7 +54,7 @@ def drag(robot, x, y):
     yield from robot.press("G")
     before = preview()
     steps = []
-    for _ in range(6):
+    for _ in range(4):
         yield from robot.move(robot.x + x, robot.y + y)
         yield from robot.wait(0.3)
         steps.append(preview())
