@@ -42,9 +42,11 @@ class SUPPLE_UL_handles(bpy.types.UIList):
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property):
         row = layout.row(align=True)
-        moved = "BONE_DATA" if item.bone else "EMPTY_AXIS"
-        row.label(text=item.name, icon="PINNED" if item.kind == "HELD" else moved)
-        row.prop(item, "kind", text="")
+        row.prop(item, "kind", text="", icon_only=True)
+        if item.bone:
+            row.label(text=item.name, icon="BONE_DATA")
+        else:
+            row.label(text=item.name)
         row.operator(
             SUPPLE_OT_handle_select.bl_idname, text="", icon="RESTRICT_SELECT_OFF"
         ).name = item.name

@@ -17,8 +17,8 @@ from . import distortion
 from .groups import MIN_WEIGHT
 
 KINDS = (
-    ("MOVED", "Moved", "Follows its Empty or bone"),
-    ("HELD", "Held", "Stays where the rest shape has it"),
+    ("MOVED", "Moved", "Follows its Empty or bone", "EMPTY_AXIS", 0),
+    ("HELD", "Held", "Stays where the rest shape has it", "PINNED", 1),
 )
 METHODS = (
     ("SUPPLE", "Supple", "What was learned from bodies, and as stiff as the slider says"),
