@@ -28,6 +28,8 @@ from .warm import Warm
 REST_SECONDS = 0.3
 # How often the rest shape is compared, and something that failed is tried again.
 CHECK_SECONDS = 1.0
+# Colours that take longer wait until the pose is settled.
+COLOUR_SECONDS = 0.03
 
 
 class LostError(Exception):
@@ -68,6 +70,7 @@ class Follower:
         self._paused = False
         self._checked = self._stretched = self._failed = 0.0
         self._stretch = None
+        self._colouring = 0.0
 
     @property
     def doing(self):
@@ -205,4 +208,12 @@ class Follower:
     def _write(self, obj, positions):
         shape_keys.rewrite(obj, shape_keys.PREVIEW, positions)
         if distortion.is_shown(obj):
-            distortion.update(obj, self._warm.rest, positions)
+            self._colour(obj, positions)
+
+    def _colour(self, obj, positions):
+        """Show the distortion: at every call where that is quick, else when the pose is settled."""
+        if self._colouring > COLOUR_SECONDS and not self._warm.settled:
+            return
+        start = time.perf_counter()
+        distortion.update(obj, self._warm.rest, positions)
+        self._colouring = time.perf_counter() - start

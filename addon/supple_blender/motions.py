@@ -50,20 +50,21 @@ def collect(place, obj, world, vertices):
 
     Raises UserError for an Empty or a bone that is not there or has no usable scale.
     """
+    to_local = np.linalg.inv(world)
     return [
         Motion(
             name=row.name,
             vertices=vertices[row.name],
-            matrix=None if row.kind == "HELD" else _matrix(place, obj, row, world),
+            matrix=None if row.kind == "HELD" else _matrix(place, obj, row, to_local),
         )
         for row in obj.supple.handles
     ]
 
 
-def _matrix(place, obj, row, world):
-    """Return the local motion (4, 4) of a moved handle."""
+def _matrix(place, obj, row, to_local):
+    """Return the local motion (4, 4) of a moved handle; to_local: from world to obj."""
     carrier = _bone_motion if row.bone else _empty_motion
-    motion, what = carrier(place, obj, row, world)
+    motion, what = carrier(place, obj, row, to_local)
     if space.is_flat(motion[:3, :3]):
         raise UserError(
             f"{obj.name}: the {what} of handle '{row.name}' is scaled to 0 or "
@@ -72,7 +73,7 @@ def _matrix(place, obj, row, world):
     return motion
 
 
-def _empty_motion(place, obj, row, world):
+def _empty_motion(place, obj, row, to_local):
     empty = row.empty
     if empty is None or place.scene.objects.get(empty.name) != empty:
         raise UserError(
@@ -80,12 +81,12 @@ def _empty_motion(place, obj, row, world):
             "Remove the handle, then add its group again."
         )
     evaluated = _evaluated(place, obj, row, empty, "Empty")
-    motion = np.linalg.inv(world) @ space.as_array(evaluated.matrix_world)
+    motion = to_local @ space.as_array(evaluated.matrix_world)
     bind = np.array(row.bind, dtype=np.float64).reshape(4, 4)
     return motion @ np.linalg.inv(bind), f"Empty '{empty.name}'"
 
 
-def _bone_motion(place, obj, row, world):
+def _bone_motion(place, obj, row, to_local):
     """As an Armature modifier has it: the armature's own place is no motion."""
     armature = row.armature
     if armature is None or place.scene.objects.get(armature.name) != armature:
@@ -101,9 +102,9 @@ def _bone_motion(place, obj, row, world):
             "Remove the handle, then add it again."
         )
     at_rest = space.as_array(bone.bone.matrix_local)
-    to_armature = np.linalg.inv(space.as_array(evaluated.matrix_world)) @ world
+    from_armature = to_local @ space.as_array(evaluated.matrix_world)
     moved = space.as_array(bone.matrix) @ np.linalg.inv(at_rest)
-    return np.linalg.inv(to_armature) @ moved @ to_armature, f"bone '{row.bone}'"
+    return from_armature @ moved @ np.linalg.inv(from_armature), f"bone '{row.bone}'"
 
 
 def _evaluated(place, obj, row, carrier, what):
