@@ -213,7 +213,7 @@ def test_the_modes_differ_and_repeat_bit_for_bit():
     bpy.data.objects["head"].rotation_euler = (0, 1.2, 0)
     results = {}
     for mode in ("NATURAL", "STIFF"):
-        bar.supple.mode = mode
+        bar.supple.stiffness = {"NATURAL": 0.0, "STIFF": 1.0}[mode]
         bpy.ops.supple.bake(name=mode)
         bpy.ops.supple.bake(name=f"{mode} again")
         results[mode] = bodies.key(bar, mode)

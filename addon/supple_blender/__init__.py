@@ -21,13 +21,14 @@ VERSION = bl_info["version"]
 from . import (  # noqa: E402
     compat,
     handle_operators,
+    live_operators,
     panel,
     pose_operators,
     preferences,
     properties,
 )
 
-_MODULES = (preferences, properties, pose_operators, handle_operators, panel)
+_MODULES = (preferences, properties, pose_operators, handle_operators, live_operators, panel)
 _cli_commands = []
 
 

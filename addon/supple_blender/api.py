@@ -13,7 +13,7 @@ then `CancelledError` is raised, and again nothing was changed. Call them from t
 
 import bpy
 
-from . import handles, mesh_data, native, pose, shape_keys
+from . import collecting, handles, mesh_data, motions, native, pose, shape_keys
 from .errors import CancelledError, UserError, count
 from .stages import Stages
 
@@ -59,15 +59,9 @@ def prepare(obj, stages=None):
 
 
 def collect_pose(obj):
-    """Return the `pose.PoseInput` of obj: its rest shape and where its Empties are now."""
-    mesh_data.require_writable(obj)
-    world = handles.world_matrix(bpy.context, obj)
-    return pose.PoseInput(
-        rest=mesh_data.collect(obj, world),
-        motions=handles.motions(bpy.context, obj, world),
-        mode=obj.supple.mode.lower(),
-        network=obj.supple.network,
-    )
+    """Return the `pose.PoseInput` of obj: its rest shape and where its handles are now."""
+    mesh_data.require_mesh(obj)
+    return collecting.collect_pose(motions.Place.of(bpy.context), obj)
 
 
 def solve(obj, stages=None):

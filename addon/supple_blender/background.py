@@ -130,7 +130,7 @@ class LongOperator:
         parts = [f"{self._inputs.name}: {stages.doing()}", stages.left(), esc]
         context.window_manager.progress_update(int(100 * stages.fraction))
         context.workspace.status_text_set("   ".join(part for part in parts if part))
-        _redraw_sidebars(context)
+        redraw_sidebars(context)
 
     def _leave(self, context):
         global running
@@ -139,10 +139,11 @@ class LongOperator:
         manager.event_timer_remove(self._timer)
         manager.progress_end()
         context.workspace.status_text_set(None)
-        _redraw_sidebars(context)
+        redraw_sidebars(context)
 
 
-def _redraw_sidebars(context):
+def redraw_sidebars(context):
+    """Show the panel anew in every window."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":

@@ -47,6 +47,21 @@ def new_world(name):
     return world
 
 
+def is_bone_selected(pose_bone):
+    """Return whether a pose bone is selected; from 5.0 on it knows itself."""
+    return pose_bone.select if hasattr(pose_bone, "select") else pose_bone.bone.select
+
+
+def select_bone(pose_bone, selected):
+    """Select or deselect a pose bone."""
+    (pose_bone if hasattr(pose_bone, "select") else pose_bone.bone).select = selected
+
+
+def is_rendering():
+    """Return whether a render runs: it reads the scene from another thread."""
+    return bpy.app.is_job_running("RENDER")
+
+
 def draw_progress(layout, fraction, text):
     """Draw a progress bar, or its text where Blender has no bar (before 4.0)."""
     if hasattr(layout, "progress"):

@@ -9,10 +9,11 @@ from .errors import UserError, count, some
 MIN_WEIGHT = 0.5
 
 
-def members(obj, names):
+def members(obj, names, least=None):
     """Return {name: sorted vertex indices (k,) int64} for the named vertex groups of obj.
 
-    Raises UserError for a group that does not exist. A group without vertices gives an empty array.
+    least: {name: weight} from which on a vertex is in it, where that is not MIN_WEIGHT. Raises
+    UserError for a group that does not exist. A group without vertices gives an empty array.
     """
     missing = [name for name in names if name not in obj.vertex_groups]
     if missing:
@@ -20,20 +21,47 @@ def members(obj, names):
         fix = f"Its groups are {some(existing, 8)}." if existing else "It has no vertex groups."
         raise UserError(f"{obj.name}: there is no vertex group {some(missing)}. {fix}")
     wanted = {obj.vertex_groups[name].index: [] for name in names}
+    limits = {obj.vertex_groups[name].index: (least or {}).get(name, MIN_WEIGHT) for name in names}
     for vertex in obj.data.vertices:
         for element in vertex.groups:
-            if element.weight >= MIN_WEIGHT and element.group in wanted:
+            if element.weight >= limits.get(element.group, np.inf):
                 wanted[element.group].append(vertex.index)
     return {name: np.array(wanted[obj.vertex_groups[name].index], dtype=np.int64) for name in names}
 
 
-def require_members(object_name, vertices_by_name):
-    """Raise UserError if a group is empty or two groups share a vertex."""
+def weights(obj, name):
+    """Return the weights (n,) float64 of vertex group `name` of obj, 0 outside it.
+
+    Raises UserError for a group that does not exist.
+    """
+    if name not in obj.vertex_groups:
+        raise UserError(
+            f"{obj.name}: the mask '{name}' is no vertex group of it. Choose another, or none."
+        )
+    index = obj.vertex_groups[name].index
+    found = np.zeros(len(obj.data.vertices))
+    for vertex in obj.data.vertices:
+        for element in vertex.groups:
+            if element.group == index:
+                found[vertex.index] = element.weight
+    return found
+
+
+def add(obj, name, vertices):
+    """Add a vertex group of these vertices, with weight 1; return its name, which may differ."""
+    group = obj.vertex_groups.new(name=name)
+    group.add([int(vertex) for vertex in vertices], 1.0, "REPLACE")
+    return group.name
+
+
+def require_members(object_name, vertices_by_name, least=None):
+    """Raise UserError if a group is empty or two groups share a vertex; least: as for `members`."""
     for name, vertices in vertices_by_name.items():
         if not len(vertices):
+            limit = (least or {}).get(name, MIN_WEIGHT)
             raise UserError(
                 f"{object_name}: vertex group '{name}' has no vertices with a weight of "
-                f"{MIN_WEIGHT} or more. Assign some in Edit Mode or remove the handle."
+                f"{limit:.2g} or more. Assign some in Edit Mode or remove the handle."
             )
     every = np.concatenate([np.empty(0, np.int64), *vertices_by_name.values()])
     vertices, counts = np.unique(every, return_counts=True)

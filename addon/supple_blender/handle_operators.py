@@ -2,15 +2,23 @@
 """Operators that make, find and remove handles."""
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import EnumProperty, IntProperty, StringProperty
 
-from . import handles, shape_keys
+from . import compat, distortion, handle_sources, handles, live, shape_keys
 from .errors import UserError, count, some
 from .pose_operators import active_body
+from .properties import KINDS
 
 
 def _names(text):
     return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def _keep_active(context, obj):
+    """Make obj the active object where that was an Empty that is gone now."""
+    if context.view_layer.objects.active is None and obj.name in context.view_layer.objects:
+        context.view_layer.objects.active = obj
+        obj.select_set(True)
 
 
 class HandleOperator:
@@ -18,9 +26,13 @@ class HandleOperator:
 
     bl_options = {"REGISTER", "UNDO"}
 
+    def body(self, context):
+        """Return the mesh object meant."""
+        return active_body(context)
+
     def execute(self, context):
         try:
-            level, message = self.change(context, active_body(context))
+            level, message = self.change(context, self.body(context))
         except UserError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -55,6 +67,80 @@ class SUPPLE_OT_handles_from_groups(HandleOperator, bpy.types.Operator):
         return "INFO", text
 
 
+class SUPPLE_OT_handles_from_selection(HandleOperator, bpy.types.Operator):
+    """Make a handle of the vertices selected in Edit Mode, with a vertex group and an Empty"""
+
+    bl_idname = "supple.handles_from_selection"
+    bl_label = "Selection"
+
+    name: StringProperty(name="Name", default="Handle", options={"SKIP_SAVE"})
+    kind: EnumProperty(name="Kind", items=KINDS, default="MOVED", options={"SKIP_SAVE"})
+
+    def change(self, context, obj):
+        name = handle_sources.from_selection(context, obj, self.name, self.kind)
+        obj.supple.active_handle = len(obj.supple.handles) - 1
+        return "INFO", f"{obj.name}: handle '{name}' added"
+
+
+class SUPPLE_OT_handles_from_bones(HandleOperator, bpy.types.Operator):
+    """Make a handle of each bone's vertex group: the selected bones in Pose Mode, else all"""
+
+    bl_idname = "supple.handles_from_bones"
+    bl_label = "Bones"
+
+    armature: StringProperty(
+        name="Armature",
+        description="The armature object; empty for the mesh's own",
+        options={"SKIP_SAVE"},
+    )
+    bones: StringProperty(
+        name="Bones",
+        description="Bones, separated by commas; empty for the selected ones, or all",
+        options={"SKIP_SAVE"},
+    )
+    held: StringProperty(
+        name="Held", description="Bones to hold, separated by commas", options={"SKIP_SAVE"}
+    )
+
+    def body(self, context):
+        obj = context.object
+        if obj is not None and obj.type == "ARMATURE":
+            return handle_sources.body_of_armature(context, obj)
+        return active_body(context)
+
+    def change(self, context, obj):
+        armature = bpy.data.objects.get(self.armature) if self.armature else None
+        if self.armature and (armature is None or armature.type != "ARMATURE"):
+            raise UserError(f"{obj.name}: there is no armature '{self.armature}'.")
+        if armature is None and context.object.type == "ARMATURE":
+            armature = context.object
+        added, left_out = handle_sources.from_bones(
+            context, obj, armature, _names(self.bones), _names(self.held)
+        )
+        text = f"{obj.name}: {count(len(added), 'handle', 'handles')} added"
+        if left_out:
+            limit = handle_sources.BONE_WEIGHT
+            text += f"; left out, with no vertices of weight {limit} or more: {some(left_out)}"
+        twice = handle_sources.also_deformed_by(obj)
+        if twice:
+            text += f". Modifier {some(twice)} moves it too: switch that off in viewports"
+        return ("WARNING" if left_out or twice else "INFO"), text
+
+
+class SUPPLE_OT_propose_handles(HandleOperator, bpy.types.Operator):
+    """Spread handles over the mesh, each with an Empty and a vertex group of its own"""
+
+    bl_idname = "supple.propose_handles"
+    bl_label = "Propose"
+
+    count: IntProperty(name="Handles", default=12, min=1, soft_max=100)
+
+    def change(self, context, obj):
+        names = handle_sources.propose(context, obj, self.count)
+        obj.supple.active_handle = len(obj.supple.handles) - 1
+        return "INFO", f"{obj.name}: {count(len(names), 'handle', 'handles')} added"
+
+
 class SUPPLE_OT_handle_remove(HandleOperator, bpy.types.Operator):
     """Remove a handle and its Empty; the vertex group stays"""
 
@@ -72,6 +158,7 @@ class SUPPLE_OT_handle_remove(HandleOperator, bpy.types.Operator):
         index = obj.supple.active_handle
         name = self.name or (rows[index].name if 0 <= index < len(rows) else "")
         handles.remove(obj, name)
+        _keep_active(context, obj)
         return "INFO", f"{obj.name}: handle '{name}' removed"
 
 
@@ -82,33 +169,45 @@ class SUPPLE_OT_handles_clear(HandleOperator, bpy.types.Operator):
     bl_label = "Clear"
 
     def change(self, context, obj):
+        if live.is_live(obj):
+            live.end(keep=True)
         shape_keys.remove_preview(obj)
+        if distortion.is_shown(obj):
+            distortion.refresh(context, obj)
         handles.clear(obj)
+        _keep_active(context, obj)
         return "INFO", f"{obj.name}: handles removed"
 
 
 class SUPPLE_OT_handle_select(HandleOperator, bpy.types.Operator):
-    """Select the Empty of a handle, ready for G, R or S"""
+    """Select the Empty or the bone of a handle, ready for G, R or S"""
 
     bl_idname = "supple.handle_select"
-    bl_label = "Select Empty"
+    bl_label = "Select Handle"
 
     name: StringProperty(name="Handle", options={"SKIP_SAVE"})
 
     def change(self, context, obj):
         row = obj.supple.handles.get(self.name)
-        if row is None or row.empty is None or row.empty.name not in context.view_layer.objects:
+        carrier = (row.armature if row.bone else row.empty) if row else None
+        if carrier is None or carrier.name not in context.view_layer.objects:
+            what = "armature" if row and row.bone else "Empty"
             raise UserError(
-                f"{obj.name}: handle '{self.name}' has no Empty in this view layer. "
+                f"{obj.name}: handle '{self.name}' has no {what} in this view layer. "
                 "Remove the handle, then add its group again."
             )
         if context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
         for other in context.selected_objects:
             other.select_set(False)
-        row.empty.select_set(True)
-        context.view_layer.objects.active = row.empty
-        return "INFO", f"'{row.empty.name}' selected"
+        carrier.select_set(True)
+        context.view_layer.objects.active = carrier
+        if row.bone:
+            bpy.ops.object.mode_set(mode="POSE")
+            for bone in carrier.pose.bones:
+                compat.select_bone(bone, bone.name == row.bone)
+            carrier.data.bones.active = carrier.data.bones.get(row.bone)
+        return "INFO", f"'{row.bone or carrier.name}' selected"
 
 
 class SUPPLE_OT_rebind(HandleOperator, bpy.types.Operator):
@@ -122,20 +221,15 @@ class SUPPLE_OT_rebind(HandleOperator, bpy.types.Operator):
         return "INFO", f"{obj.name}: handles fit its {len(obj.data.vertices):,} vertices now"
 
 
-_CLASSES = (
-    SUPPLE_OT_handles_from_groups,
-    SUPPLE_OT_handle_remove,
-    SUPPLE_OT_handles_clear,
-    SUPPLE_OT_handle_select,
-    SUPPLE_OT_rebind,
+register, unregister = bpy.utils.register_classes_factory(
+    (
+        SUPPLE_OT_handles_from_groups,
+        SUPPLE_OT_handles_from_selection,
+        SUPPLE_OT_handles_from_bones,
+        SUPPLE_OT_propose_handles,
+        SUPPLE_OT_handle_remove,
+        SUPPLE_OT_handles_clear,
+        SUPPLE_OT_handle_select,
+        SUPPLE_OT_rebind,
+    )
 )
-
-
-def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)

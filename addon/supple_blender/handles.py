@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Handles: rows on the object, an Empty for each, and the motion an Empty gives its vertices."""
-
-from dataclasses import dataclass
+"""Handles: rows on the object, and an Empty or a bone for each."""
 
 import bpy
 import numpy as np
@@ -13,15 +11,6 @@ from .errors import UserError, some
 # Groups with their centre within this part of the body's height above the lowest are proposed as
 # held.
 GROUND_BAND = 0.1
-
-
-@dataclass(frozen=True)
-class Motion:
-    """What a handle does: vertices (k,), and a local matrix (4, 4) or None where it is held."""
-
-    name: str
-    vertices: np.ndarray
-    matrix: np.ndarray | None
 
 
 def world_matrix(context, obj):
@@ -39,13 +28,15 @@ def owns(obj, handle):
 
 
 def body_of(obj):
-    """Return the mesh object that the user means by obj: itself, or the one that an Empty poses."""
+    """Return the mesh object that the user means by obj: itself, or the one that an Empty or an
+    armature poses.
+    """
     if obj is None or obj.type == "MESH":
         return obj
     if obj.parent and any(row.empty == obj for row in obj.parent.supple.handles):
         return obj.parent
     for other in bpy.data.objects:
-        if any(row.empty == obj for row in other.supple.handles):
+        if any(obj in (row.empty, row.armature) for row in other.supple.handles):
             return other
     return obj
 
@@ -65,6 +56,14 @@ def require_bound(obj):
             f"{obj.name}: it had {body.bound_vertices} vertices when its handles were made and has "
             f"{count} now. Press Rebind to go on with the mesh as it is."
         )
+
+
+def row_vertices(obj):
+    """Return {handle: vertices (k,)} for obj's rows. Raises UserError if one does not fit."""
+    least = {row.name: row.least for row in obj.supple.handles}
+    found = groups.members(obj, list(least), least)
+    groups.require_members(obj.name, found, least)
+    return found
 
 
 def _propose_held(heights, body_height):
@@ -98,8 +97,7 @@ def _choose(obj, names, held):
             f"{obj.name}: its vertex groups {some(left_out)} have no vertices with a weight of "
             f"{groups.MIN_WEIGHT} or more. Assign some in Edit Mode."
         )
-    rows = groups.members(obj, [row.name for row in obj.supple.handles])
-    groups.require_members(obj.name, {**rows, **found})
+    groups.require_members(obj.name, {**row_vertices(obj), **found})
     return found, left_out
 
 
@@ -214,69 +212,10 @@ def rebind(context, obj):
     mesh_data.require_writable(obj)
     world = world_matrix(context, obj)
     rest = mesh_data.collect(obj, world)
-    found = groups.members(obj, [row.name for row in obj.supple.handles])
-    groups.require_members(obj.name, found)
+    found = row_vertices(obj)
     mesh_data.leave_mode(obj)
     for row in obj.supple.handles:
         if row.empty and row.empty.parent == obj:
             centroid = rest.positions[found[row.name]].mean(axis=0)
             _place(obj, row, space.bind_matrix(world, centroid))
     obj.supple.bound_vertices = len(rest.positions)
-
-
-def _is_enabled(collection, obj):
-    """Return whether a path from `collection` to obj has no collection disabled in viewports.
-
-    Blender does not evaluate objects in disabled collections, yet calls them evaluated.
-    """
-    if collection.hide_viewport:
-        return False
-    return obj in collection.objects.values() or any(
-        _is_enabled(child, obj) for child in collection.children
-    )
-
-
-def _motion_matrix(context, obj, row, world):
-    """Return the local motion (4, 4) of a moved handle."""
-    empty = row.empty
-    if empty is None or context.scene.objects.get(empty.name) != empty:
-        raise UserError(
-            f"{obj.name}: the Empty of handle '{row.name}' was deleted. "
-            "Remove the handle, then add its group again."
-        )
-    evaluated = empty.evaluated_get(context.evaluated_depsgraph_get())
-    if not evaluated.is_evaluated or not _is_enabled(context.scene.collection, empty):
-        raise UserError(
-            f"{obj.name}: the collection of Empty '{empty.name}' (handle '{row.name}') is disabled "
-            "in viewports, so Blender does not move it. Enable it in the Outliner; to hide it, use "
-            "the eye."
-        )
-    motion = np.linalg.inv(world) @ space.as_array(evaluated.matrix_world)
-    motion = motion @ np.linalg.inv(np.array(row.bind, dtype=np.float64).reshape(4, 4))
-    if space.is_flat(motion[:3, :3]):
-        raise UserError(
-            f"{obj.name}: the Empty '{empty.name}' of handle '{row.name}' is scaled to 0 or "
-            "infinity. Give it another scale on X, Y and Z (Alt+S resets it)."
-        )
-    return motion
-
-
-def motions(context, obj, world):
-    """Return the list of Motion of obj's handles now. Raises UserError as the messages say."""
-    require_bound(obj)
-    rows = obj.supple.handles
-    if not rows:
-        raise UserError(
-            f"{obj.name}: it has no handles. Press + Groups to make one for each vertex group."
-        )
-    mesh_data.flush_edit_mode(obj)
-    found = groups.members(obj, [row.name for row in rows])
-    groups.require_members(obj.name, found)
-    return [
-        Motion(
-            name=row.name,
-            vertices=found[row.name],
-            matrix=None if row.kind == "HELD" else _motion_matrix(context, obj, row, world),
-        )
-        for row in rows
-    ]

@@ -15,6 +15,7 @@ from . import (
     handles,
     job_render,
     mesh_data,
+    motions,
     native,
     pose,
     shape_keys,
@@ -25,6 +26,7 @@ from .stages import Stages
 
 # The other axis of an OBJ: bodies with Y up look along Z, as Blender's own default has it.
 FORWARD = {"Y": "NEGATIVE_Z", "Z": "Y"}
+STIFFNESS = {"natural": 0.0, "stiff": 1.0}
 
 
 def _say(text):
@@ -106,14 +108,14 @@ def _add_groups(obj, path, file):
 
 def _motion(move, vertices, rest, world):
     if move.matrix is None:
-        return handles.Motion(move.group, vertices, None)
+        return motions.Motion(move.group, vertices, None)
     motion = move.matrix
     if move.about_centroid:
         centre = space.to_world_points(world, rest.positions[vertices]).mean(axis=0)
         to_centre = np.eye(4)
         to_centre[:3, 3] = -centre
         motion = np.linalg.inv(to_centre) @ motion @ to_centre
-    return handles.Motion(move.group, vertices, space.to_local_matrix(world, motion))
+    return motions.Motion(move.group, vertices, space.to_local_matrix(world, motion))
 
 
 def _pose(job, obj):
@@ -121,8 +123,9 @@ def _pose(job, obj):
     rest = mesh_data.collect(obj, world)
     found = groups.members(obj, [move.group for move in job.moves])
     groups.require_members(obj.name, found)
-    motions = [_motion(move, found[move.group], rest, world) for move in job.moves]
-    pose_input = pose.PoseInput(rest=rest, motions=motions, mode=job.mode, network=job.network)
+    moves = [_motion(move, found[move.group], rest, world) for move in job.moves]
+    options = pose.Options(stiffness=STIFFNESS[job.mode], network=job.network)
+    pose_input = pose.PoseInput(rest=rest, motions=moves, options=options)
     return pose_input, pose.solve(pose_input, Stages())
 
 

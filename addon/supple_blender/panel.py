@@ -5,13 +5,22 @@ import textwrap
 
 import bpy
 
-from . import background, compat, handles, native, status
+from . import background, compat, distortion, handles, live, native, status
 from .handle_operators import (
     SUPPLE_OT_handle_remove,
     SUPPLE_OT_handle_select,
     SUPPLE_OT_handles_clear,
+    SUPPLE_OT_handles_from_bones,
     SUPPLE_OT_handles_from_groups,
+    SUPPLE_OT_handles_from_selection,
+    SUPPLE_OT_propose_handles,
     SUPPLE_OT_rebind,
+)
+from .live_operators import (
+    SUPPLE_OT_distortion,
+    SUPPLE_OT_distortion_view,
+    SUPPLE_OT_live,
+    SUPPLE_OT_live_keep,
 )
 from .pose_operators import (
     SUPPLE_OT_bake,
@@ -29,12 +38,15 @@ def _draw_text(layout, text, icon):
 
 
 class SUPPLE_UL_handles(bpy.types.UIList):
-    """One row a handle: its group, its kind, a button that selects its Empty."""
+    """One row a handle: its group, its kind, a button that selects what moves it."""
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property):
         row = layout.row(align=True)
-        row.label(text=item.name, icon="PINNED" if item.kind == "HELD" else "EMPTY_AXIS")
-        row.prop(item, "kind", text="")
+        row.prop(item, "kind", text="", icon_only=True)
+        if item.bone:
+            row.label(text=item.name, icon="BONE_DATA")
+        else:
+            row.label(text=item.name)
         row.operator(
             SUPPLE_OT_handle_select.bl_idname, text="", icon="RESTRICT_SELECT_OFF"
         ).name = item.name
@@ -89,38 +101,122 @@ class SUPPLE_PT_pose(_Sidebar, bpy.types.Panel):
         body = obj.supple
         row = layout.row()
         row.template_list("SUPPLE_UL_handles", "", body, "handles", body, "active_handle", rows=4)
-        row = layout.row(align=True)
-        row.operator(SUPPLE_OT_handles_from_groups.bl_idname, icon="ADD")
-        row.operator(SUPPLE_OT_handle_remove.bl_idname, text="", icon="REMOVE")
-        row.operator(SUPPLE_OT_handles_clear.bl_idname, icon="X")
+        column = row.column(align=True)
+        column.operator(SUPPLE_OT_handle_remove.bl_idname, text="", icon="REMOVE")
+        column.separator()
+        column.operator(SUPPLE_OT_handles_clear.bl_idname, text="", icon="X")
+        self._draw_sources(layout)
         if body.handles and body.bound_vertices != len(obj.data.vertices):
             _draw_text(layout, f"It had {body.bound_vertices:,} vertices before", "ERROR")
             layout.operator(SUPPLE_OT_rebind.bl_idname)
-        layout.row().prop(body, "mode", expand=True)
+        self._draw_look(layout, body)
+        self._draw_live(layout, obj)
         self._draw_key(layout, obj)
+
+    def _draw_sources(self, layout):
+        column = layout.column(align=True)
+        row = column.row(align=True)
+        row.operator(SUPPLE_OT_handles_from_groups.bl_idname, icon="ADD")
+        row.operator(SUPPLE_OT_handles_from_selection.bl_idname, icon="ADD")
+        row = column.row(align=True)
+        row.operator(SUPPLE_OT_handles_from_bones.bl_idname, icon="ADD")
+        row.operator(SUPPLE_OT_propose_handles.bl_idname, text="Propose 12", icon="ADD").count = 12
+
+    def _draw_look(self, layout, body):
+        row = layout.split(factor=0.3)
+        row.active = body.method == "SUPPLE"
+        row.label(text="Natural")
+        row = row.split(factor=0.74)
+        row.prop(body, "stiffness", text="", slider=True)
+        row.label(text="Stiff")
+        layout.prop(body, "strength", slider=True)
+
+    def _draw_live(self, layout, obj):
+        is_live = live.is_live(obj)
+        row = layout.row(align=True)
+        row.scale_y = 1.3
+        button = SUPPLE_OT_live_keep if is_live else SUPPLE_OT_live
+        icon = "PAUSE" if is_live else "PLAY"
+        row.operator(button.bl_idname, text="Live", icon=icon, depress=is_live)
+        preview = row.row(align=True)
+        preview.enabled = not is_live
+        preview.operator(SUPPLE_OT_solve.bl_idname)
+        if is_live:
+            layout.label(text=live.running.doing, icon="INFO")
+            layout.label(text="Enter keeps, Esc takes back")
+            if live.running.problem:
+                _draw_text(layout, live.running.problem, "ERROR")
+        elif live.ended:
+            _draw_text(layout, live.ended, "INFO")
 
     def _draw_key(self, layout, obj):
         name = obj.supple.key_name
         keys = obj.data.shape_keys
         row = layout.row()
         row.prop(obj.supple, "key_name", text="Key")
-        column = layout.column(align=True)
-        column.operator(SUPPLE_OT_solve.bl_idname)
-        bake = column.operator(SUPPLE_OT_bake.bl_idname, text="Bake")
+        bake = row.operator(SUPPLE_OT_bake.bl_idname, text="Bake")
         bake.name = name
         bake.overwrite = obj.supple.overwrite
         if keys and name in keys.key_blocks:
             layout.prop(obj.supple, "overwrite", text=f"Overwrite '{name}'")
 
 
-_CLASSES = (SUPPLE_UL_handles, SUPPLE_PT_mesh, SUPPLE_PT_pose)
+class _PoseSettings(_Sidebar):
+    bl_parent_id = "SUPPLE_PT_pose"
+    bl_options = {"DEFAULT_CLOSED"}
 
 
-def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
+class SUPPLE_PT_look(_PoseSettings, bpy.types.Panel):
+    bl_label = "Where and How"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.enabled = background.running is None
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        obj = handles.body_of(context.object)
+        layout.prop_search(obj.supple, "mask", obj, "vertex_groups")
+        layout.prop(obj.supple, "falloff")
+        layout.prop(obj.supple, "method")
+        row = layout.row()
+        row.active = obj.supple.method == "SUPPLE"
+        row.prop(obj.supple, "network", text="Learned")
 
 
-def unregister():
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+class SUPPLE_PT_distortion(_PoseSettings, bpy.types.Panel):
+    bl_label = "Show Distortion"
+
+    def draw_header(self, context):
+        obj = handles.body_of(context.object)
+        is_shown = distortion.is_shown(obj)
+        icon = "CHECKBOX_HLT" if is_shown else "CHECKBOX_DEHLT"
+        button = self.layout.operator(
+            SUPPLE_OT_distortion.bl_idname, text="", icon=icon, emboss=False
+        )
+        button.show = not is_shown
+
+    def draw(self, context):
+        layout = self.layout
+        obj = handles.body_of(context.object)
+        layout.active = distortion.is_shown(obj)
+        row = layout.row(align=True)
+        for index in range(len(distortion.LEVELS)):
+            row.prop(context.window_manager.supple_legend, f"colour_{index}", text="")
+        row = layout.row(align=True)
+        for level in distortion.LEVELS:
+            row.label(text=f"{level:g}")
+        row = layout.row()
+        is_viewed = distortion.is_shown(obj) and distortion.is_viewed(obj, context.space_data)
+        row.enabled = not is_viewed
+        row.operator(SUPPLE_OT_distortion_view.bl_idname, icon="SHADING_SOLID")
+
+
+register, unregister = bpy.utils.register_classes_factory(
+    (
+        SUPPLE_UL_handles,
+        SUPPLE_PT_mesh,
+        SUPPLE_PT_pose,
+        SUPPLE_PT_look,
+        SUPPLE_PT_distortion,
+    )
+)

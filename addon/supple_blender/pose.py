@@ -5,21 +5,33 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from . import native, prepared, space
+from . import live_solver, native, prepared, space
 from .errors import CancelledError, UserError
+from .live_solver import Options
 from .mesh_data import RestMesh
 
 MODEL = "rotation"
 
 
 @dataclass(frozen=True)
+class Blend:
+    """How much of a pose is taken. mask: (n,) in [0, 1] or None. falloff: the distance from the
+    moved handles, in solve space, at which nothing of it is left; 0: it is taken everywhere.
+    """
+
+    strength: float = 1.0
+    mask: np.ndarray | None = None
+    falloff: float = 0.0
+
+
+@dataclass(frozen=True)
 class PoseInput:
-    """Everything a solve needs; motions: a list of handles.Motion, mode: 'natural' or 'stiff'."""
+    """Everything a solve needs; motions: a list of motions.Motion."""
 
     rest: RestMesh
     motions: list
-    mode: str = "natural"
-    network: bool = True
+    options: Options = field(default_factory=Options)
+    blend: Blend = field(default_factory=Blend)
 
 
 @dataclass(frozen=True)
@@ -31,7 +43,7 @@ class Pose:
     report: dict = field(default_factory=dict)
 
 
-def _guarded(name, compute):
+def guarded(name, compute):
     """Run `compute`, turning the native package's errors into messages that name the object."""
     supple = native.supple()
     try:
@@ -44,48 +56,65 @@ def _guarded(name, compute):
 
 def prepare(rest, stages):
     """Prepare a RestMesh; return its `supple.PreparedMesh`."""
-    return _guarded(rest.name, lambda: prepared.mesh(rest, stages))
+    return guarded(rest.name, lambda: prepared.mesh(rest, stages))
 
 
 def check(rest):
     """Return the messages of what the native package finds unusual in a RestMesh."""
     supple = native.supple()
-    mesh = _guarded(rest.name, lambda: supple.Mesh(rest.positions, rest.triangles))
+    mesh = guarded(rest.name, lambda: supple.Mesh(rest.positions, rest.triangles))
     return [note.message for note in mesh.notes]
 
 
-def _native_handles(pose_input):
+def native_handles(rest, motions):
+    """Return motions.Motion as a list of `supple.Handle` in the solve space of RestMesh rest."""
     handle = native.supple().Handle
-    stretch = pose_input.rest.stretch
     return [
         handle(
             name=motion.name,
             vertices=motion.vertices,
-            matrix=None if motion.matrix is None else space.to_solve_matrix(stretch, motion.matrix),
+            matrix=None
+            if motion.matrix is None
+            else space.to_solve_matrix(rest.stretch, motion.matrix),
         )
-        for motion in pose_input.motions
+        for motion in motions
     ]
+
+
+def blend_weights(mesh, motions, blend):
+    """Return how much of the pose each vertex takes, (n,), or None for all of it."""
+    if blend.falloff <= 0:
+        return blend.mask
+    moved = [motion.vertices for motion in motions if motion.matrix is not None]
+    if not moved:
+        return blend.mask
+    weights = live_solver.falloff_weights(mesh, np.concatenate(moved), blend.falloff)
+    return weights if blend.mask is None else weights * blend.mask
+
+
+def to_local(rest, vertices, strength, weights):
+    """Return solved vertices (n, 3) as local positions, as far as strength and weights say."""
+    vertices = np.asarray(vertices)
+    if strength != 1.0 or weights is not None:
+        at_rest = space.to_solve_points(rest.stretch, rest.positions)
+        vertices = live_solver.blend(at_rest, vertices, strength, weights)
+    return space.to_local_points(rest.stretch, vertices)
 
 
 def solve(pose_input, stages):
     """Return the Pose. Raises UserError, or CancelledError after `stages.cancel()`."""
-    return _guarded(pose_input.rest.name, lambda: _solve(pose_input, stages))
+    return guarded(pose_input.rest.name, lambda: _solve(pose_input, stages))
 
 
 def _solve(pose_input, stages):
-    rest = pose_input.rest
-    handles = _native_handles(pose_input)
-    model = MODEL if pose_input.network else None
+    rest, blend = pose_input.rest, pose_input.blend
+    handles = native_handles(rest, pose_input.motions)
     mesh = prepared.mesh(rest, stages, share=0.7)
-    editor = prepared.editor(rest, mesh, handles, model, stages, share=0.2)
-    result = editor.solve(
-        handles,
-        mode=pose_input.mode,
-        network=pose_input.network,
-        progress=stages.begin("Solving", 0.1),
-    )
+    editor = prepared.editor(rest, mesh, handles, MODEL, stages, share=0.2)
+    result = live_solver.solve(editor, handles, pose_input.options, stages.begin("Solving", 0.1))
+    weights = blend_weights(mesh, pose_input.motions, blend)
     return Pose(
-        positions=space.to_local_points(rest.stretch, np.asarray(result.vertices)),
+        positions=to_local(rest, result.vertices, blend.strength, weights),
         notes=[note.message for note in result.notes],
         report={**result.report, "from_cache": mesh.from_cache},
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from . import api, handles, mesh_data, pose, prepared, shape_keys, status
+from . import api, distortion, handles, live, mesh_data, pose, prepared, shape_keys, status
 from .background import LongOperator
 from .errors import UserError, some
 
@@ -87,7 +87,11 @@ class PoseOperator(LongOperator):
     def write(self, context, inputs, result):
         obj = find_unchanged(inputs.name, inputs.pose.rest)
         shape_keys.require_free(obj, inputs.key, self.overwrite)
+        if live.is_live(obj):
+            live.end(keep=True)
         shape_keys.write(obj, inputs.key, result.positions)
+        if distortion.is_shown(obj):
+            distortion.refresh(context, obj)
         mesh = prepared.mesh_if_ready(inputs.pose.rest)
         if mesh:
             status.remember(inputs.pose.rest, mesh.seconds, [note.message for note in mesh.notes])
@@ -167,15 +171,15 @@ class SUPPLE_OT_check_mesh(bpy.types.Operator):
             self.layout.label(text=line, icon="DOT")
 
 
-_CLASSES = (SUPPLE_OT_prepare, SUPPLE_OT_solve, SUPPLE_OT_bake, SUPPLE_OT_check_mesh)
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(
+    (SUPPLE_OT_prepare, SUPPLE_OT_solve, SUPPLE_OT_bake, SUPPLE_OT_check_mesh)
+)
 
 
 def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
+    _register_classes()
 
 
 def unregister():
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+    _unregister_classes()
     prepared.clear()

@@ -81,12 +81,13 @@ def _amount(size):
     return f"{count(size.files, 'mesh', 'meshes')}, {size.bytes / MEBIBYTE:.1f} MiB"
 
 
-_CLASSES = (SUPPLE_OT_cache_clear, SUPPLE_AP_preferences)
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(
+    (SUPPLE_OT_cache_clear, SUPPLE_AP_preferences)
+)
 
 
 def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
+    _register_classes()
     # Not there where the add-on is registered by a script that did not enable it.
     addon = bpy.context.preferences.addons.get(__package__)
     if addon is not None and addon.preferences is not None:
@@ -94,5 +95,4 @@ def register():
 
 
 def unregister():
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+    _unregister_classes()

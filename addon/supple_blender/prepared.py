@@ -28,6 +28,11 @@ class _Cache:
                 self._entries.move_to_end(key)
             return self._entries.get(key)
 
+    def latest(self, fits):
+        """Return the value used last whose key `fits`, or None."""
+        with self._lock:
+            return next((self._entries[key] for key in reversed(self._entries) if fits(key)), None)
+
     def put(self, key, value):
         with self._lock:
             self._entries[key] = value
@@ -105,6 +110,10 @@ def editor(rest, prepared_mesh, handles, model, stages, share):
     found = _editors.get(key)
     if found is None:
         progress = stages.begin("Binding handles", share)
-        found = native.supple().Editor(prepared_mesh, handles, model=model, progress=progress)
+        other = _editors.latest(lambda kept: (kept[0], kept[2]) == (rest.digest, model))
+        if hasattr(other, "rebind"):
+            found = other.rebind(handles, progress=progress)
+        else:
+            found = native.supple().Editor(prepared_mesh, handles, model=model, progress=progress)
         _editors.put(key, found)
     return found

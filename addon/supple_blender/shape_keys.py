@@ -16,14 +16,15 @@ def _digest(positions):
     return hashlib.blake2b(np.ascontiguousarray(positions).tobytes(), digest_size=16).hexdigest()
 
 
-def _find(obj, name):
+def find(obj, name):
+    """Return shape key `name` of obj, or None."""
     keys = obj.data.shape_keys
     return keys.key_blocks.get(name) if keys else None
 
 
 def is_ours(obj, name):
     """Return whether Supple wrote shape key `name` and nobody changed its shape since."""
-    key, record = _find(obj, name), obj.supple.keys.get(name)
+    key, record = find(obj, name), obj.supple.keys.get(name)
     return bool(key and record) and record.digest == _digest(compat.read_key(key))
 
 
@@ -42,7 +43,7 @@ def require_free(obj, name, overwrite=False):
             f"{obj.name}: its shape keys are absolute. "
             "Switch on Relative (Properties > Data > Shape Keys)."
         )
-    key = _find(obj, name)
+    key = find(obj, name)
     if key is None:
         return
     if key == keys.reference_key:
@@ -60,18 +61,25 @@ def _write(obj, name, positions):
     if not obj.data.shape_keys:
         compat.add_key(obj, "Basis")
         obj.supple.made_basis = True
-    key = _find(obj, name) or compat.add_key(obj, name)
-    compat.write_key(obj.data, key, positions)
+    if find(obj, name) is None:
+        compat.add_key(obj, name)
+    if name not in obj.supple.keys:
+        obj.supple.keys.add().name = name
+    rewrite(obj, name, positions)
     obj.active_shape_key_index = obj.data.shape_keys.key_blocks.find(name)
-    record = obj.supple.keys.get(name) or obj.supple.keys.add()
-    record.name = name
-    record.digest = _digest(compat.read_key(key))
+
+
+def rewrite(obj, name, positions):
+    """Write local positions (n, 3) to shape key `name`, which Supple wrote before; nothing else."""
+    positions = np.ascontiguousarray(positions, dtype=np.float32)
+    compat.write_key(obj.data, find(obj, name), positions)
+    obj.supple.keys[name].digest = _digest(positions)
 
 
 def _remove_preview(obj):
     if not is_ours(obj, PREVIEW):
         return
-    obj.shape_key_remove(_find(obj, PREVIEW))
+    obj.shape_key_remove(find(obj, PREVIEW))
     obj.supple.keys.remove(obj.supple.keys.find(PREVIEW))
     if obj.supple.made_basis and len(obj.data.shape_keys.key_blocks) == 1:
         obj.shape_key_clear()

@@ -49,14 +49,23 @@ def solve_stretch(world, name):
     return np.eye(3) if np.abs(stretch - np.eye(3)).max() < 2e-5 else stretch
 
 
+def uniform_scale(world):
+    """Return how many world units one unit of solve space is."""
+    return float(np.cbrt(abs(np.linalg.det(world[:3, :3]))))
+
+
+def _is_identity(stretch):
+    return np.array_equal(stretch, np.eye(3))
+
+
 def to_solve_points(stretch, points):
     """Map local points (n, 3) to solve space."""
-    return points @ stretch.T
+    return points if _is_identity(stretch) else points @ stretch.T
 
 
 def to_local_points(stretch, points):
     """Map points (n, 3) in solve space back to local."""
-    return points @ np.linalg.inv(stretch).T
+    return points if _is_identity(stretch) else points @ np.linalg.inv(stretch).T
 
 
 def to_solve_matrix(stretch, matrix):

@@ -12,6 +12,7 @@ sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parent.parent)]
 import bodies  # noqa: E402
 import bpy  # noqa: E402
 import install  # noqa: E402
+import live_parts  # noqa: E402
 import numpy as np  # noqa: E402
 from robot import Robot  # noqa: E402
 
@@ -19,12 +20,11 @@ from robot import Robot  # noqa: E402
 # misses fails the check that follows it, and leaves a screenshot.
 TAB = (1044, 552)
 PREPARE = (887, 647)
-SELECT_HEAD = (1004, 535)
+SELECT_HEAD = (974, 535)
 GROUPS = (887, 473)
-KEY_NAME = (950, 421)
-PREVIEW = (931, 395)
-BAKE = (931, 374)
-OVERWRITE = (860, 348)
+PREVIEW = (974, 371)
+BAKE = (982, 342)
+OVERWRITE = (860, 316)
 
 
 def say(text):
@@ -227,6 +227,7 @@ def scenario(robot):
         overwrite_only_when_told,
         bake_in_edit_mode,
         handles_in_edit_mode,
+        *live_parts.PARTS,
         cancel_long_work,
     ):
         yield from part(robot)
