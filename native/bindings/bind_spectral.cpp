@@ -5,6 +5,7 @@
 #include "supple/spectral/eigenbasis.h"
 #include "supple/spectral/functional_map.h"
 #include "supple/spectral/recovery.h"
+#include "supple/spectral/sampling.h"
 
 namespace supple::bindings {
 namespace {
@@ -27,6 +28,9 @@ EmbeddingRecovery recovery_of(const Points& vertices, const Faces& faces, const 
 }  // namespace
 
 void bind_spectral(py::module_& module) {
+  module.def("farthest_points", &farthest_point_samples, py::arg("points"), py::arg("count"),
+             NoGil());
+
   module.def(
       "eigenbasis",
       [](const Points& vertices, const Faces& faces, int count, const std::string& method,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings.h"
 #include "supple/core/error.h"
+#include "supple/tasks/blending.h"
 #include "supple/tasks/deform.h"
 #include "supple/tasks/edit.h"
 #include "supple/tasks/metrics.h"
@@ -29,6 +30,34 @@ EditOptions edit_options(const std::string& method, double stiffness, int rounds
 
 std::pair<Points, EditReport> pair_of(EditResult result) {
   return {std::move(result.vertices), result.report};
+}
+
+// On the mesh's own vertices and in its units; one that has no face with an area is only itself.
+Eigen::VectorXd mesh_falloff_weights(const PreparedMesh& prepared, const Eigen::VectorXi& vertices,
+                                     double radius) {
+  const TriangleMesh& mesh = prepared.mesh;
+  const Eigen::Index n = mesh.vertices().rows();
+  Eigen::VectorXd result = Eigen::VectorXd::Zero(n);
+  std::vector<int> on_surface;
+  for (const int vertex : vertices) {
+    if (vertex < 0 || vertex >= n) {
+      throw Error(ErrorCode::index_out_of_range, "Vertex " + std::to_string(vertex) +
+                                                     " is not in a mesh of " + std::to_string(n) +
+                                                     " vertices.");
+    }
+    result[vertex] = 1.0;
+    if (mesh.surface_vertex()[vertex] >= 0) {
+      on_surface.push_back(mesh.surface_vertex()[vertex]);
+    }
+  }
+  const Eigen::VectorXd weights = falloff_weights(
+      prepared.operators,
+      Eigen::Map<Eigen::VectorXi>(on_surface.data(), static_cast<Eigen::Index>(on_surface.size())),
+      radius / mesh.scale());
+  for (Eigen::Index i = 0; i < weights.size(); ++i) {
+    result[mesh.mesh_vertex()[i]] = weights[i];
+  }
+  return result;
 }
 
 // The rotations of a `rotation` signal as they are: m x 9, one matrix a face.
@@ -154,6 +183,11 @@ void bind_tasks(py::module_& module) {
           },
           py::arg("milliseconds"), NoGil())
       .def_property_readonly("settled", &EditSession::settled);
+
+  module.def("blend", &blend, py::arg("rest"), py::arg("posed"), py::arg("strength"),
+             py::arg("weights"), NoGil());
+  module.def("falloff_weights", &mesh_falloff_weights, py::arg("prepared"), py::arg("vertices"),
+             py::arg("radius"), NoGil());
 
   module.def(
       "deform",

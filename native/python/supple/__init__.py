@@ -10,8 +10,9 @@ Source: "Deformation Recovery: Localized Learning for Detail-Preserving Deformat
 from . import _environment as _environment  # first: it acts before the native module loads
 from . import cache
 from ._native import PreparedCache, Progress, __version__, blas_name, simd_level
+from .blending import blend, falloff_weights, farthest_points
 from .deforming import deform
-from .editing import Editor, EditResult, Handle, edit
+from .editing import Editor, EditResult, EditSession, Handle, edit
 from .errors import Cancelled, SuppleError
 from .learning import TrainResult, train
 from .mesh import Mesh, Note, PreparedMesh
@@ -22,6 +23,7 @@ from .parallel import set_thread_count, thread_count
 __all__ = [
     "Cancelled",
     "EditResult",
+    "EditSession",
     "Editor",
     "Handle",
     "Mesh",
@@ -34,10 +36,13 @@ __all__ = [
     "TrainResult",
     "__version__",
     "blas_name",
+    "blend",
     "cache",
     "deform",
     "edit",
     "face_distortion",
+    "falloff_weights",
+    "farthest_points",
     "flipped_faces",
     "load_model",
     "pose_error",

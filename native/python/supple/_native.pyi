@@ -16,7 +16,9 @@ import scipy.sparse
 
 __all__: list[str] = [
     "Architecture",
+    "EditOptions",
     "EditReport",
+    "EditSession",
     "Editor",
     "EmbeddingRecovery",
     "Handle",
@@ -30,12 +32,15 @@ __all__: list[str] = [
     "TrainingPair",
     "TriangleMesh",
     "blas_name",
+    "blend",
     "closest_rotations",
     "cotan_laplacian",
     "deform",
     "eigenbasis",
     "face_areas",
     "face_distortion",
+    "falloff_weights",
+    "farthest_points",
     "flipped_faces",
     "functional_map",
     "gradient",
@@ -295,6 +300,19 @@ class HandleTarget:
         positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"] | None = None,
     ) -> None: ...
 
+class EditOptions:
+    def __init__(
+        self,
+        method: str = "supple",
+        stiffness: typing.SupportsFloat | typing.SupportsIndex = 0.0,
+        rounds: typing.SupportsInt | typing.SupportsIndex = -1,
+        network_rounds: typing.SupportsInt | typing.SupportsIndex = -1,
+        polish: typing.SupportsInt | typing.SupportsIndex = -1,
+        passes: typing.SupportsInt | typing.SupportsIndex = -1,
+        network: bool = True,
+        loose_pieces_follow: bool = True,
+    ) -> None: ...
+
 class EditReport:
     @property
     def network(self) -> bool: ...
@@ -302,6 +320,8 @@ class EditReport:
     def passes(self) -> int: ...
     @property
     def passes_milliseconds(self) -> float: ...
+    @property
+    def polish(self) -> int: ...
     @property
     def rounds(self) -> int: ...
     @property
@@ -318,20 +338,40 @@ class Editor:
         handles: collections.abc.Sequence[Handle],
         network: Network,
         progress: Progress = None,
+        former: Editor = None,
     ) -> None: ...
     def solve(
         self,
         targets: collections.abc.Sequence[HandleTarget],
-        mode: str = "natural",
-        rounds: typing.SupportsInt | typing.SupportsIndex = -1,
-        network_rounds: typing.SupportsInt | typing.SupportsIndex = -1,
-        passes: typing.SupportsInt | typing.SupportsIndex = -1,
-        network: bool = True,
-        loose_pieces_follow: bool = True,
+        options: EditOptions,
         progress: Progress = None,
     ) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"], EditReport]: ...
 
+class EditSession:
+    def __init__(self, editor: Editor, options: EditOptions) -> None: ...
+    def advance(
+        self, milliseconds: typing.SupportsFloat | typing.SupportsIndex
+    ) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"], EditReport]: ...
+    def aim(self, targets: collections.abc.Sequence[HandleTarget]) -> None: ...
+    @property
+    def settled(self) -> bool: ...
+
 def blas_name() -> str: ...
+def blend(
+    rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    posed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    strength: typing.SupportsFloat | typing.SupportsIndex,
+    weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+def falloff_weights(
+    prepared: PreparedMesh,
+    vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+    radius: typing.SupportsFloat | typing.SupportsIndex,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+def farthest_points(
+    points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    count: typing.SupportsInt | typing.SupportsIndex,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
 def closest_rotations(
     jacobians: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 9]"],
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]: ...

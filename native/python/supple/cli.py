@@ -4,6 +4,7 @@
 import json
 import os
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import asdict
 from enum import StrEnum
@@ -38,6 +39,7 @@ class Mode(StrEnum):
 
     natural = "natural"
     stiff = "stiff"
+    arap = "arap"
 
 
 @app.callback(invoke_without_command=True)
@@ -58,6 +60,10 @@ def edit(
     out: Annotated[Path, typer.Option(help="Folder for the posed meshes, NAME.obj each.")],
     report: Annotated[Path | None, typer.Option(help="JSON file for the figures.")] = None,
     mode: Annotated[Mode, typer.Option(help="How an edit ends.")] = Mode.natural,
+    stiffness: Annotated[
+        float | None,
+        typer.Option(min=0.0, max=1.0, help="Between natural (0) and stiff (1), in mode's place."),
+    ] = None,
     network: Annotated[bool, typer.Option(help="Use the network, or the identity.")] = True,
     model: Annotated[str, typer.Option(help="Shipped network or .safetensors file.")] = "rotation",
     cache: Annotated[bool, typer.Option(help="Keep prepared meshes on disk, and use them.")] = True,
@@ -68,6 +74,7 @@ def edit(
     """
     figures: dict[str, dict] = {}
     errors: dict[str, str] = {}
+    how = {"mode": mode.value} if stiffness is None else {"stiffness": stiffness}
     try:
         chosen = supple.load_model(model) if network else None
         out.mkdir(parents=True, exist_ok=True)
@@ -81,7 +88,7 @@ def edit(
                 raise supple.SuppleError(
                     "bad_case", f"Two cases are called '{case.name}'; rename one folder."
                 )
-            vertices, figures[case.name] = _edit_case(case, chosen, mode, cache)
+            vertices, figures[case.name] = _edit_case(case, chosen, how, cache)
             write_mesh(out / f"{case.name}.obj", vertices, case.faces)
         except (supple.SuppleError, OSError) as error:
             errors[str(folder)] = str(error)
@@ -90,7 +97,7 @@ def edit(
         content = {
             "cases": figures,
             "errors": errors,
-            "mode": mode.value,
+            **how,
             "network": network,
             "model": chosen.metadata if chosen else None,
             "version": supple.__version__,
@@ -127,17 +134,17 @@ def show_cache(
 
 
 def _edit_case(
-    case: EditCase, model: supple.Model | None, mode: Mode, cache: bool
+    case: EditCase, model: supple.Model | None, how: dict[str, object], cache: bool
 ) -> tuple[np.ndarray, dict[str, object]]:
     def prepare(progress: supple.Progress) -> supple.PreparedMesh:
         return supple.PreparedMesh(case.vertices, case.faces, progress=progress, cache=cache)
 
     prepared = _watched(f"{case.name}: preparing", prepare)
+    start = time.perf_counter()
     editor = supple.Editor(prepared, case.handles, model=model)
-    result = _watched(f"{case.name}: solving", lambda p: editor.solve(mode=mode.value, progress=p))
-    times = sorted(
-        editor.solve(mode=mode.value).report["milliseconds"] for _ in range(_MEASURED_SOLVES)
-    )
+    bind_milliseconds = 1e3 * (time.perf_counter() - start)
+    result = _watched(f"{case.name}: solving", lambda p: editor.solve(**how, progress=p))
+    times = sorted(editor.solve(**how).report["milliseconds"] for _ in range(_MEASURED_SOLVES))
     error = max(
         np.linalg.norm(result.vertices[handle.vertices] - target, axis=1).max()
         for handle, target in zip(case.handles, _targets(case), strict=True)
@@ -152,6 +159,7 @@ def _edit_case(
         "handle_error": error / prepared.diagonal,
         "pose_error": pose_error,
         "prepare_seconds": prepared.seconds,
+        "bind_milliseconds": bind_milliseconds,
         "from_cache": prepared.from_cache,
         "frame_milliseconds": times[_MEASURED_SOLVES // 2],
         "vertices": prepared.vertex_count,

@@ -172,9 +172,7 @@ class Editor:
         loose_pieces: str = "follow",
     ) -> "EditSession":
         """An edit that goes on while its targets change; the arguments are those of `solve`."""
-        options = _options(
-            mode, stiffness, method, None, None, None, None, network, loose_pieces
-        )
+        options = _options(mode, stiffness, method, None, None, None, None, network, loose_pieces)
         return EditSession(self, _native.EditSession(self._native, options))
 
     def _targets(self, handles: Sequence[Handle]) -> list[_native.HandleTarget]:
@@ -242,9 +240,7 @@ def _options(
     loose_pieces: str,
 ) -> _native.EditOptions:
     if mode is not None and mode not in _MODES:
-        raise SuppleError(
-            "bad_option", f"'{mode}' is no mode. Use 'natural', 'stiff' or 'arap'."
-        )
+        raise SuppleError("bad_option", f"'{mode}' is no mode. Use 'natural', 'stiff' or 'arap'.")
     if mode is not None and (stiffness is not None or method is not None):
         raise SuppleError("bad_option", "Give mode, or stiffness and method, not both.")
     if loose_pieces not in ("follow", "stay"):
