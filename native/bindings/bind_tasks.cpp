@@ -11,16 +11,24 @@ namespace {
 
 using Network = LocalJacobianNetwork<float>;
 
-EditOptions edit_options(const std::string& mode, int rounds, int network_rounds, int passes,
-                         bool network, bool loose_pieces_follow) {
+EditOptions edit_options(const std::string& method, double stiffness, int rounds,
+                         int network_rounds, int polish, int passes, bool network,
+                         bool loose_pieces_follow) {
+  const auto set = [](int& option, int value) { option = value < 0 ? option : value; };
   EditOptions options;
-  options.mode = edit_mode(mode);
-  options.rounds = rounds < 0 ? options.rounds : rounds;
-  options.network_rounds = network_rounds < 0 ? options.network_rounds : network_rounds;
-  options.passes = passes < 0 ? options.passes : passes;
+  options.method = edit_method(method);
+  options.stiffness = stiffness;
+  set(options.rounds, rounds);
+  set(options.network_rounds, network_rounds);
+  set(options.polish, polish);
+  set(options.passes, passes);
   options.network = network;
   options.loose_pieces = loose_pieces_follow ? LoosePieces::follow : LoosePieces::stay;
   return options;
+}
+
+std::pair<Points, EditReport> pair_of(EditResult result) {
+  return {std::move(result.vertices), result.report};
 }
 
 // The rotations of a `rotation` signal as they are: m x 9, one matrix a face.
@@ -100,8 +108,15 @@ void bind_tasks(py::module_& module) {
            }),
            py::arg("matrix") = py::none(), py::arg("positions") = py::none());
 
+  py::class_<EditOptions>(module, "EditOptions")
+      .def(py::init(&edit_options), py::arg("method") = "supple", py::arg("stiffness") = 0.0,
+           py::arg("rounds") = -1, py::arg("network_rounds") = -1, py::arg("polish") = -1,
+           py::arg("passes") = -1, py::arg("network") = true,
+           py::arg("loose_pieces_follow") = true);
+
   py::class_<EditReport>(module, "EditReport")
       .def_readonly("rounds", &EditReport::rounds)
+      .def_readonly("polish", &EditReport::polish)
       .def_readonly("passes", &EditReport::passes)
       .def_readonly("network", &EditReport::network)
       .def_readonly("suggestion_milliseconds", &EditReport::suggestion_milliseconds)
@@ -109,28 +124,36 @@ void bind_tasks(py::module_& module) {
       .def_readonly("passes_milliseconds", &EditReport::passes_milliseconds)
       .def_readonly("total_milliseconds", &EditReport::total_milliseconds);
 
-  py::class_<Editor>(module, "Editor")
+  py::class_<Editor, std::shared_ptr<Editor>>(module, "Editor")
       .def(py::init([](std::shared_ptr<PreparedMesh> prepared, const std::vector<Handle>& handles,
-                       std::shared_ptr<Network> network, Progress* progress) {
-             return std::make_unique<Editor>(std::move(prepared), handles, std::move(network),
-                                             range(progress).stage("factoring", 0.0, 1.0));
+                       std::shared_ptr<Network> network, Progress* progress, const Editor* former) {
+             return std::make_shared<Editor>(std::move(prepared), handles, std::move(network),
+                                             range(progress).stage("factoring", 0.0, 1.0), former);
            }),
            py::arg("prepared"), py::arg("handles"), py::arg("network"),
-           py::arg("progress") = nullptr, NoGil())
+           py::arg("progress") = nullptr, py::arg("former") = nullptr, NoGil())
       .def(
           "solve",
           [](const Editor& editor, const std::vector<HandleTarget>& targets,
-             const std::string& mode, int rounds, int network_rounds, int passes, bool network,
-             bool loose_pieces_follow, Progress* progress) {
-            EditResult result = editor.solve(
-                targets,
-                edit_options(mode, rounds, network_rounds, passes, network, loose_pieces_follow),
-                range(progress).stage("solving", 0.0, 1.0));
-            return std::make_pair(std::move(result.vertices), result.report);
+             const EditOptions& options, Progress* progress) {
+            return pair_of(
+                editor.solve(targets, options, range(progress).stage("solving", 0.0, 1.0)));
           },
-          py::arg("targets"), py::arg("mode") = "natural", py::arg("rounds") = -1,
-          py::arg("network_rounds") = -1, py::arg("passes") = -1, py::arg("network") = true,
-          py::arg("loose_pieces_follow") = true, py::arg("progress") = nullptr, NoGil());
+          py::arg("targets"), py::arg("options"), py::arg("progress") = nullptr, NoGil());
+
+  py::class_<EditSession>(module, "EditSession")
+      .def(py::init([](std::shared_ptr<Editor> editor, const EditOptions& options) {
+             return std::make_unique<EditSession>(std::move(editor), options);
+           }),
+           py::arg("editor"), py::arg("options"))
+      .def("aim", &EditSession::aim, py::arg("targets"), NoGil())
+      .def(
+          "advance",
+          [](EditSession& session, double milliseconds) {
+            return pair_of(session.advance(milliseconds));
+          },
+          py::arg("milliseconds"), NoGil())
+      .def_property_readonly("settled", &EditSession::settled);
 
   module.def(
       "deform",

@@ -20,7 +20,7 @@ def make(
     pairs: Annotated[int, typer.Option(min=1, help="How many pairs.")] = 60,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same pairs.")] = 0,
     held_out: Annotated[
-        bool, typer.Option("--held-out", help="Bodies that no training pair has.")
+        bool, typer.Option("--held-out", help="Bodies and creatures that no training pair has.")
     ] = False,
     vertices: Annotated[
         tuple[int, int], typer.Option(help="The range of vertex counts.", metavar="LOW HIGH")
@@ -28,16 +28,24 @@ def make(
     other_bodies: Annotated[
         float, typer.Option(min=0, max=1, help="The share of targets that are another body.")
     ] = 0.2,
+    creatures: Annotated[
+        float, typer.Option(min=0, max=1, help="The share of pairs that are random creatures.")
+    ] = 0.5,
     small: Annotated[
         bool, typer.Option("--small", help="float32, compressed: for a file kept in a repository.")
     ] = False,
     processes: Annotated[int, typer.Option(min=1, help="Processes that make pairs.")] = 2,
     cache: Annotated[Path, typer.Option(help="Where pairs are kept.")] = DEFAULT_CACHE,
 ) -> None:
-    """Sample bodies and poses from anny, triangulate each anew, and write them as pairs."""
+    """Sample bodies and creatures and poses of them, triangulate each anew, write them as pairs."""
     try:
         settings = pair_store.PairSettings(
-            pairs, seed, held_out, vertices, other_body_share=other_bodies
+            pairs,
+            seed,
+            held_out,
+            vertices,
+            other_body_share=other_bodies,
+            creature_share=creatures,
         )
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error

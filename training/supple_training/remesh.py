@@ -43,16 +43,21 @@ class Remeshed:
 def euler_characteristic(faces: IntArray) -> int:
     """Vertices minus edges plus faces, over the vertices that faces use: 2 for a sphere."""
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    return len(np.unique(faces)) - len(np.unique(edges, axis=0)) + len(faces)
+    return len(np.unique(faces)) - len(np.unique(_edge_numbers(edges))) + len(faces)
+
+
+def _edge_numbers(edges: IntArray) -> IntArray:
+    """A number for each edge (k, 2), the same for equal rows only: faster to sort than rows."""
+    return edges[:, 0] * (np.int64(edges.max()) + 1) + edges[:, 1]
 
 
 def is_closed_manifold(faces: IntArray) -> bool:
     """Whether every edge has exactly two faces of opposite direction, and every vertex one fan."""
     directed = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    unique = np.unique(directed, axis=0)
+    unique = np.unique(_edge_numbers(directed))
     if len(unique) != len(directed):
         return False
-    if not np.array_equal(unique, np.unique(directed[:, ::-1], axis=0)):
+    if not np.array_equal(unique, np.unique(_edge_numbers(directed[:, ::-1]))):
         return False
     return bool(np.all(igl.is_vertex_manifold(faces)))
 
@@ -104,7 +109,7 @@ def _decimate(
     return points @ np.linalg.inv(stretch), faces
 
 
-def _relax(points: FloatArray, faces: IntArray, steps: int) -> FloatArray:
+def relax(points: FloatArray, faces: IntArray, steps: int) -> FloatArray:
     """Move each vertex half way to its neighbours' mean, within its tangent plane."""
     adjacency = igl.adjacency_matrix(faces).astype(np.float64)
     mean = scipy.sparse.diags(1.0 / np.asarray(adjacency.sum(axis=1)).ravel()) @ adjacency
@@ -165,7 +170,7 @@ def remesh(
         method = METHODS[rng.integers(len(METHODS))]
         count = int(rng.integers(low, high + 1))
         points, new_faces = _decimate(vertices, faces, method, count, rng)
-        points = _relax(points, new_faces, int(rng.integers(0, 7)))
+        points = relax(points, new_faces, int(rng.integers(0, 7)))
         corners, weights = _closest(
             points, igl.per_vertex_normals(points, new_faces), vertices, faces
         )

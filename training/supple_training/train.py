@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Command: train a network on bodies from anny, all of the training in C++.
+"""Command: train a network on bodies and creatures, all of the training in C++.
 
 python -m supple_training.train rotation --out rotation.safetensors
 python -m supple_training.train spectral --out spectral.safetensors
@@ -33,7 +33,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 HELD_OUT_SEED = 1_000_000
-"""Added to the seed for held-out pairs, which also come from bodies of their own."""
+"""Added to the seed for held-out pairs, which also come from bodies and creatures of their own."""
 
 SUGGESTIONS = 4
 """Edits of each pair that the rotation network is trained on."""
@@ -173,18 +173,18 @@ def report_table(measured: dict) -> Table:
 def main(
     signal: Annotated[Signal, typer.Argument(help="What the network starts from.")],
     out: Annotated[Path, typer.Option(help="The .safetensors file to write.")],
-    pairs: Annotated[int, typer.Option(min=1, help="Training pairs, one a step.")] = 60,
-    epochs: Annotated[int, typer.Option(min=1, help="Every pair once each.")] = 50,
+    pairs: Annotated[int, typer.Option(min=1, help="Training pairs, one a step.")] = 240,
+    epochs: Annotated[int, typer.Option(min=1, help="Every pair once each.")] = 40,
     seed: Annotated[int, typer.Option(min=0, help="Of the pairs, weights and draws.")] = 0,
     config: Annotated[Config, typer.Option(help="Form of the network.")] = Config.equivariant,
-    held_out: Annotated[int, typer.Option(min=1, help="Pairs to measure on.")] = 12,
+    held_out: Annotated[int, typer.Option(min=1, help="Pairs to measure on.")] = 24,
     data: Annotated[
         Path | None, typer.Option(help="Train on this .npz of pairs instead of new ones.")
     ] = None,
     processes: Annotated[int, typer.Option(min=1, help="Processes that make pairs.")] = 2,
     cache: Annotated[Path, typer.Option(help="Where pairs are kept.")] = DEFAULT_CACHE,
 ) -> None:
-    """Train a network, measure it on held-out bodies, write it with its metrics and loss curve."""
+    """Train a network, measure it on held-out pairs, write it with its metrics and loss curve."""
     if out.suffix != ".safetensors":
         raise typer.BadParameter(f"{out} must end in .safetensors", param_hint="--out")
     if not out.parent.is_dir():
@@ -193,7 +193,7 @@ def main(
     if data is None:
         training = pairs_with_progress(settings, cache, processes=processes)
         source = (
-            f"{pairs} pairs of bodies and poses sampled from anny 0.6.2 "
+            f"{pairs} pairs: poses of random creatures and of bodies sampled from anny 0.6.2 "
             f"(code Apache-2.0, MakeHuman assets CC0-1.0), seed {seed}"
         )
     else:

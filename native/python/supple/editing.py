@@ -51,7 +51,8 @@ class EditResult:
     Attributes:
         vertices: (n, 3) float64, the caller's units; handle vertices exactly on their targets.
         notes: what is unusual about the mesh.
-        report: rounds, passes, network (whether it was used), and the milliseconds of each stage.
+        report: rounds, polish, passes, network (whether it was used), and the milliseconds of each
+            stage.
     """
 
     vertices: NDArray[np.float64]
@@ -60,7 +61,7 @@ class EditResult:
 
 
 class Editor:
-    """Handles bound to a prepared mesh: factored once, solved for any targets. The paper, 4.4.
+    """Handles bound to a prepared mesh, for any targets. The paper, 4.4; docs/method.md.
 
     Args:
         prepared: the rest mesh.
@@ -81,39 +82,71 @@ class Editor:
         model: str | os.PathLike | Model | None = "rotation",
         progress: _native.Progress | None = None,
     ) -> None:
-        self.prepared = prepared
-        self.handles = list(handles)
         if model is not None and not isinstance(model, Model):
             model = load_model(model)
+        self._bind(prepared, handles, model, progress, None)
+
+    def _bind(
+        self,
+        prepared: PreparedMesh,
+        handles: Sequence[Handle],
+        model: Model | None,
+        progress: _native.Progress | None,
+        former: _native.Editor | None,
+    ) -> None:
+        self.prepared = prepared
+        self.handles = list(handles)
         self.model = model
         self._native = _native.Editor(
             prepared.native,
             [handle._native_handle() for handle in self.handles],
             None if model is None else model.native,
             progress,
+            former,
         )
+
+    def rebind(
+        self, handles: Sequence[Handle], *, progress: _native.Progress | None = None
+    ) -> "Editor":
+        """An editor of the same mesh and network with other handles: added, removed or changed.
+
+        What the two share is not computed again, so a few vertices more or less take milliseconds.
+        The result is the same as that of a new Editor.
+
+        Raises:
+            SuppleError: as for Editor.
+        """
+        other = Editor.__new__(Editor)
+        other._bind(self.prepared, handles, self.model, progress, self._native)
+        return other
 
     def solve(
         self,
         handles: Sequence[Handle] | None = None,
         *,
-        mode: str = "natural",
+        mode: str | None = None,
+        stiffness: float | None = None,
+        method: str | None = None,
         rounds: int | None = None,
         network_rounds: int | None = None,
+        polish: int | None = None,
         passes: int | None = None,
         network: bool = True,
         loose_pieces: str = "follow",
         progress: _native.Progress | None = None,
     ) -> EditResult:
-        """Pose the mesh. The native work runs without the GIL.
+        """Pose the mesh; the same result every time. The native work runs without the GIL.
 
         Args:
             handles: the same handles, in order, with new targets; None for those given before.
-            mode: "natural" ends with the network's Jacobians, "stiff" with passes towards least
-                distortion.
-            rounds: of closest rotations and Poisson solve; None for the default, 3.
-            network_rounds: how many of them, the last ones, use the network; None for 1.
-            passes: of closest rotations and Poisson solve, "stiff" only; None for the default.
+            mode: short for the two below: "natural" (stiffness 0), "stiff" (1) or "arap" (method).
+            stiffness: from 0, natural, the network's shape, to 1, stiff, least distortion.
+            method: "supple", or "arap" for as-rigid-as-possible (spokes and rims).
+            rounds: of closest rotations and Poisson solve; None for the default.
+            network_rounds: how many of them, the last ones, use the network; None for the default.
+            polish: passes that let the network's stretch turn with the result; None for the default.
+            passes: the most towards least distortion at stiffness 1, and of "arap"; None for the
+                default.
             network: False replaces it by the identity.
             loose_pieces: "follow" or "stay": what components without a handle do.
             progress: a Progress to watch and cancel.
@@ -122,48 +155,138 @@ class Editor:
             SuppleError: wrong_shape, not_finite, singular_matrix, bad_option.
             Cancelled: if progress was cancelled.
         """
-        current = self.handles if handles is None else list(handles)
+        options = _options(
+            mode, stiffness, method, rounds, network_rounds, polish, passes, network, loose_pieces
+        )
+        targets = self._targets(self.handles if handles is None else handles)
+        vertices, report = self._native.solve(targets, options, progress)
+        return _result(self.prepared, vertices, report)
+
+    def session(
+        self,
+        *,
+        mode: str | None = None,
+        stiffness: float | None = None,
+        method: str | None = None,
+        network: bool = True,
+        loose_pieces: str = "follow",
+    ) -> "EditSession":
+        """An edit that goes on while its targets change; the arguments are those of `solve`."""
+        options = _options(
+            mode, stiffness, method, None, None, None, None, network, loose_pieces
+        )
+        return EditSession(self, _native.EditSession(self._native, options))
+
+    def _targets(self, handles: Sequence[Handle]) -> list[_native.HandleTarget]:
+        current = list(handles)
         for bound, given in zip(self.handles, current, strict=False):
             if bound.name != given.name:
                 raise SuppleError(
                     "bad_option",
                     f"Handle '{given.name}' stands where '{bound.name}' was bound. Give the same "
-                    "handles in the same order, or make a new Editor.",
+                    "handles in the same order, or use `rebind`.",
                 )
-        if loose_pieces not in ("follow", "stay"):
-            raise SuppleError(
-                "bad_option", f"loose_pieces is '{loose_pieces}'; use 'follow' or 'stay'."
-            )
-        for name, value in (
-            ("rounds", rounds),
-            ("network_rounds", network_rounds),
-            ("passes", passes),
-        ):
-            if value is not None and value < 0:
-                raise SuppleError("bad_option", f"{name} is {value}; it must be 0 or more.")
-        vertices, report = self._native.solve(
-            [handle._native_target() for handle in current],
-            mode,
-            -1 if rounds is None else rounds,
-            -1 if network_rounds is None else network_rounds,
-            -1 if passes is None else passes,
-            network,
-            loose_pieces == "follow",
-            progress,
+        return [handle._native_target() for handle in current]
+
+
+class EditSession:
+    """A drag: `aim` at new targets, `advance` for as long as a frame allows. See Editor.session.
+
+    Not safe to share between threads.
+    """
+
+    def __init__(self, editor: Editor, native: _native.EditSession) -> None:
+        self._editor = editor
+        self._native = native
+
+    def aim(self, handles: Sequence[Handle]) -> None:
+        """New targets of the editor's handles, in order. What was done for the last is dropped.
+
+        Raises:
+            SuppleError: as for Editor.solve.
+        """
+        self._native.aim(self._editor._targets(handles))
+
+    def advance(self, milliseconds: float = 12.0) -> NDArray[np.float64]:
+        """Work for about so long, at least to a usable pose. Returns (n, 3) vertices.
+
+        Called until `settled`, it ends where Editor.solve does.
+
+        Raises:
+            SuppleError: bad_option before the first `aim`.
+        """
+        return self.step(milliseconds).vertices
+
+    def step(self, milliseconds: float = 12.0) -> EditResult:
+        """As `advance`, with the report."""
+        return _result(self._editor.prepared, *self._native.advance(milliseconds))
+
+    @property
+    def settled(self) -> bool:
+        """Whether another `advance` would change nothing."""
+        return self._native.settled
+
+
+_MODES = {"natural": ("supple", 0.0), "stiff": ("supple", 1.0), "arap": ("arap", 1.0)}
+
+
+def _options(
+    mode: str | None,
+    stiffness: float | None,
+    method: str | None,
+    rounds: int | None,
+    network_rounds: int | None,
+    polish: int | None,
+    passes: int | None,
+    network: bool,
+    loose_pieces: str,
+) -> _native.EditOptions:
+    if mode is not None and mode not in _MODES:
+        raise SuppleError(
+            "bad_option", f"'{mode}' is no mode. Use 'natural', 'stiff' or 'arap'."
         )
-        return EditResult(
-            vertices,
-            list(self.prepared.notes),
-            {
-                "rounds": report.rounds,
-                "passes": report.passes,
-                "network": report.network,
-                "suggestion_milliseconds": report.suggestion_milliseconds,
-                "rounds_milliseconds": report.rounds_milliseconds,
-                "passes_milliseconds": report.passes_milliseconds,
-                "milliseconds": report.total_milliseconds,
-            },
+    if mode is not None and (stiffness is not None or method is not None):
+        raise SuppleError("bad_option", "Give mode, or stiffness and method, not both.")
+    if loose_pieces not in ("follow", "stay"):
+        raise SuppleError(
+            "bad_option", f"loose_pieces is '{loose_pieces}'; use 'follow' or 'stay'."
         )
+    counts = {
+        "rounds": rounds,
+        "network_rounds": network_rounds,
+        "polish": polish,
+        "passes": passes,
+    }
+    for name, value in counts.items():
+        if value is not None and value < 0:
+            raise SuppleError("bad_option", f"{name} is {value}; it must be 0 or more.")
+    usual_method, usual_stiffness = _MODES[mode or "natural"]
+    return _native.EditOptions(
+        usual_method if method is None else method,
+        usual_stiffness if stiffness is None else float(stiffness),
+        **{name: -1 if value is None else value for name, value in counts.items()},
+        network=network,
+        loose_pieces_follow=loose_pieces == "follow",
+    )
+
+
+def _result(
+    prepared: PreparedMesh, vertices: NDArray[np.float64], report: _native.EditReport
+) -> EditResult:
+    return EditResult(
+        vertices,
+        list(prepared.notes),
+        {
+            "rounds": report.rounds,
+            "polish": report.polish,
+            "passes": report.passes,
+            "network": report.network,
+            "suggestion_milliseconds": report.suggestion_milliseconds,
+            "rounds_milliseconds": report.rounds_milliseconds,
+            "passes_milliseconds": report.passes_milliseconds,
+            "milliseconds": report.total_milliseconds,
+        },
+    )
 
 
 def edit(

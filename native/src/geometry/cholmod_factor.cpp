@@ -99,7 +99,9 @@ class CholmodFactor : public Factor {
   }
   Eigen::Index entries() const override { return static_cast<Eigen::Index>(factor_->xsize); }
 
-  RowMatrix<double> solve(const RowMatrix<double>& rhs) const override {
+  RowMatrix<double> solve(const RowMatrix<double>& rhs, Substitution part) const override {
+    const bool ordered_in = part == Substitution::backward;
+    const bool ordered_out = part == Substitution::forward;
     const Eigen::Index n = rhs.rows(), columns = rhs.cols();
     const int width = panel_width(columns, omp_in_parallel() ? 1 : omp_get_max_threads());
     const int panels = static_cast<int>((columns + width - 1) / width);
@@ -117,14 +119,15 @@ class CholmodFactor : public Factor {
       const Eigen::Index count = std::min<Eigen::Index>(width, columns - first);
       for (Eigen::Index i = 0; i < n; ++i) {
         double* const to = panel + i * width;
-        const double* const from = rhs.data() + order[i] * columns + first;
+        const double* const from = rhs.data() + (ordered_in ? i : order[i]) * columns + first;
         std::copy(from, from + count, to);
         std::fill(to + count, to + width, 0.0);
       }
-      solve_panel(view_, panel, width);
+      solve_panel(view_, panel, width, part);
       for (Eigen::Index i = 0; i < n; ++i) {
         const double* const from = panel + i * width;
-        std::copy(from, from + count, solution.data() + order[i] * columns + first);
+        std::copy(from, from + count,
+                  solution.data() + (ordered_out ? i : order[i]) * columns + first);
       }
     }
     return solution;

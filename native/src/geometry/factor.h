@@ -9,13 +9,16 @@
 
 namespace supple {
 
+/// Which part of a solve: all of it, or one half.
+enum class Substitution { both, forward, backward };
+
 /// A numeric factorisation, n x n, n > 0.
 class Factor {
  public:
   virtual ~Factor() = default;
   virtual Eigen::Index entries() const = 0;
   /// n x c to n x c, c > 0; safe to call from several threads.
-  virtual RowMatrix<double> solve(const RowMatrix<double>& rhs) const = 0;
+  virtual RowMatrix<double> solve(const RowMatrix<double>& rhs, Substitution part) const = 0;
 };
 
 /// The error of every factorisation that fails.

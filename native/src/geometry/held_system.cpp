@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "supple/geometry/held_system.h"
 
+#include <Eigen/LU>
 #include <string>
 #include <vector>
 
+#include "held_rows.h"
 #include "supple/core/error.h"
 
 namespace supple {
-namespace {
 
-// Position of each row among the held, or -1.
 Eigen::VectorXi held_slots(Eigen::Index n, const Eigen::VectorXi& held) {
   Eigen::VectorXi slot = Eigen::VectorXi::Constant(n, -1);
   for (Eigen::Index i = 0; i < held.size(); ++i) {
@@ -27,6 +27,8 @@ Eigen::VectorXi held_slots(Eigen::Index n, const Eigen::VectorXi& held) {
   return slot;
 }
 
+namespace {
+
 // n x held: the columns of the held rows, without the held rows themselves.
 SparseMatrix coupling_of(const SparseMatrix& matrix, const Eigen::VectorXi& held) {
   const Eigen::VectorXi slot = held_slots(matrix.rows(), held);
@@ -43,8 +45,8 @@ SparseMatrix coupling_of(const SparseMatrix& matrix, const Eigen::VectorXi& held
   return result;
 }
 
-// The matrix with the held rows and columns set to those of a diagonal one. Its pattern stays, so
-// that one analysis serves every set of held rows.
+}  // namespace
+
 SparseMatrix with_held_rows(const SparseMatrix& matrix, const Eigen::VectorXi& held) {
   const Eigen::VectorXi slot = held_slots(matrix.rows(), held);
   SparseMatrix result = matrix;
@@ -68,21 +70,148 @@ Eigen::VectorXi first_of_each(const Eigen::VectorXi& component, int count) {
   return first;
 }
 
-}  // namespace
+// What is factored, and the rows that were held then.
+struct HeldSystem::Factored {
+  Factored(const SparseMatrix& matrix, const Eigen::VectorXi& held_in,
+           std::shared_ptr<const SymbolicCholesky> symbolic)
+      : held(held_in),
+        slot(held_slots(matrix.rows(), held_in)),
+        coupling(coupling_of(matrix, held_in)),
+        factor(with_held_rows(matrix, held_in), std::move(symbolic)) {
+    std::vector<Eigen::Triplet<double>> entries;
+    for (int h = 0; h < held.size(); ++h) {
+      for (SparseMatrix::InnerIterator it(matrix, held[h]); it; ++it) {
+        if (slot[it.row()] >= 0) {
+          entries.emplace_back(slot[it.row()], h, it.value());
+        }
+      }
+    }
+    among.resize(held.size(), held.size());
+    among.setFromTriplets(entries.begin(), entries.end());
+  }
+
+  Eigen::VectorXi held, slot;
+  SparseMatrix coupling;  // n x held, of the other rows
+  SparseMatrix among;     // held x held
+  SparseCholesky factor;
+};
+
+struct HeldSystem::Changes {
+  Eigen::VectorXi source;  // per place in factored.held: its place in held_, or -1: free now
+  std::vector<int> added;  // places in held_ that were not factored as held
+  std::vector<int> freed;  // places in factored.held
+  // Columns in the factor's order: L^-1 of the unit vectors of `added`, then of the coupling of
+  // `freed` with its sign turned, so that the half of a solution is half + columns [m; x].
+  SparseMatrix columns;
+  Eigen::PartialPivLU<Eigen::MatrixXd> small;
+};
 
 HeldSystem::HeldSystem(const SparseMatrix& matrix, const Eigen::VectorXi& held,
                        std::shared_ptr<const SymbolicCholesky> symbolic)
-    : held_(held),
-      coupling_(coupling_of(matrix, held)),
-      factor_(with_held_rows(matrix, held), std::move(symbolic)) {}
+    : factored_(std::make_shared<const Factored>(matrix, held, std::move(symbolic))), held_(held) {}
+
+std::optional<HeldSystem> HeldSystem::changed(const Eigen::VectorXi& held) const {
+  const Factored& base = *factored_;
+  const Eigen::Index n = base.slot.size();
+  const Eigen::VectorXi slot = held_slots(n, held);
+  auto changes = std::make_shared<Changes>();
+  changes->source.resize(base.held.size());
+  for (int i = 0; i < base.held.size(); ++i) {
+    changes->source[i] = slot[base.held[i]];
+    if (changes->source[i] < 0) {
+      changes->freed.push_back(i);
+    }
+  }
+  for (int i = 0; i < held.size(); ++i) {
+    if (base.slot[held[i]] < 0) {
+      changes->added.push_back(i);
+    }
+  }
+  const auto added = static_cast<Eigen::Index>(changes->added.size());
+  const auto freed = static_cast<Eigen::Index>(changes->freed.size());
+  if (added + freed > kMostChanges) {
+    return std::nullopt;
+  }
+  RowMatrix<double> columns = RowMatrix<double>::Zero(n, added + freed);
+  for (Eigen::Index i = 0; i < added; ++i) {
+    columns(held[changes->added[static_cast<size_t>(i)]], i) = 1.0;
+  }
+  for (Eigen::Index i = 0; i < freed; ++i) {
+    for (SparseMatrix::InnerIterator it(base.coupling, changes->freed[static_cast<size_t>(i)]); it;
+         ++it) {
+      columns(it.row(), added + i) = -it.value();
+    }
+  }
+  columns = base.factor.forward(columns);
+  changes->columns = columns.sparseView(0.0, 0.0);
+  // With Y, Z the two kinds of columns (Z with its sign), m the multipliers, x the freed rows:
+  //   Y^T Y m + Y^T Z x = held values - Y^T half
+  //   -Z^T Y m + (A_xx - Z^T Z) x = rhs - A_xk held values + Z^T half
+  const SparseMatrix gram = changes->columns.transpose() * changes->columns;
+  Eigen::MatrixXd small = gram;
+  small.bottomRows(freed) *= -1.0;
+  for (Eigen::Index i = 0; i < freed; ++i) {
+    for (Eigen::Index j = 0; j < freed; ++j) {
+      small(added + i, added + j) += base.among.coeff(changes->freed[static_cast<size_t>(i)],
+                                                      changes->freed[static_cast<size_t>(j)]);
+    }
+  }
+  changes->small.compute(small);
+  HeldSystem result;
+  result.factored_ = factored_;
+  result.held_ = held;
+  if (added + freed > 0 || !(base.held == held)) {
+    result.changes_ = std::move(changes);
+  }
+  return result;
+}
 
 Points HeldSystem::solve(const Points& rhs, const Points& held_values) const {
-  RowMatrix<double> reduced = rhs;
-  reduced.noalias() -= coupling_ * held_values;
-  for (const int row : held_) {
-    reduced.row(row).setZero();
+  const Factored& base = *factored_;
+  RowMatrix<double> load = rhs;
+  if (changes_ == nullptr) {
+    load.noalias() -= base.coupling * held_values;
+    for (const int row : base.held) {
+      load.row(row).setZero();
+    }
+    Points result = base.factor.solve(load);
+    for (Eigen::Index i = 0; i < held_.size(); ++i) {
+      result.row(held_[i]) = held_values.row(i);
+    }
+    return result;
   }
-  Points result = factor_.solve(reduced);
+  const Changes& changes = *changes_;
+  const auto added = static_cast<Eigen::Index>(changes.added.size());
+  const auto freed = static_cast<Eigen::Index>(changes.freed.size());
+  RowMatrix<double> kept = RowMatrix<double>::Zero(base.held.size(), 3);
+  for (Eigen::Index i = 0; i < kept.rows(); ++i) {
+    if (changes.source[i] >= 0) {
+      kept.row(i) = held_values.row(changes.source[i]);
+    }
+  }
+  load.noalias() -= base.coupling * kept;
+  for (const int row : base.held) {
+    load.row(row).setZero();
+  }
+  RowMatrix<double> half = base.factor.forward(load);
+  RowMatrix<double> unknown = -(changes.columns.transpose() * half);
+  const RowMatrix<double> between = base.among * kept;
+  for (Eigen::Index i = 0; i < added; ++i) {
+    unknown.row(i) += held_values.row(changes.added[static_cast<size_t>(i)]);
+  }
+  for (Eigen::Index i = 0; i < freed; ++i) {
+    const int place = changes.freed[static_cast<size_t>(i)];
+    unknown.row(added + i) =
+        rhs.row(base.held[place]) - between.row(place) - unknown.row(added + i);
+  }
+  if (added + freed > 0) {
+    unknown = changes.small.solve(unknown).eval();
+  }
+  half += changes.columns * unknown;
+  Points result = base.factor.backward(half);
+  for (Eigen::Index i = 0; i < freed; ++i) {
+    result.row(base.held[changes.freed[static_cast<size_t>(i)]]) = unknown.row(added + i);
+  }
   for (Eigen::Index i = 0; i < held_.size(); ++i) {
     result.row(held_[i]) = held_values.row(i);
   }
@@ -90,15 +219,8 @@ Points HeldSystem::solve(const Points& rhs, const Points& held_values) const {
 }
 
 Points HeldSystem::solve_backward(const Points& grad) const {
-  RowMatrix<double> reduced = grad;
-  for (const int row : held_) {
-    reduced.row(row).setZero();
-  }
-  Points result = factor_.solve(reduced);
-  for (const int row : held_) {
-    result.row(row).setZero();
-  }
-  return result;
+  // Its own transpose, where the held rows are 0.
+  return solve(grad, Points::Zero(held_.size(), 3));
 }
 
 FreePoisson::FreePoisson(const SparseMatrix& laplacian, const Eigen::VectorXd& mass,

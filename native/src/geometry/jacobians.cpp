@@ -4,7 +4,11 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "supple/core/simd.h"
 
 namespace supple {
 namespace {
@@ -105,11 +109,107 @@ Matrix3 closest_rotation(const Matrix3& j) {
   return rotation_by_svd(j);
 }
 
+namespace {
+
+// Cofactors of 3x3 matrices, a vector of lanes a number.
+template <class V>
+SUPPLE_INLINE void cofactors(const V* q, V* out) {
+  for (int i = 0; i < 3; ++i) {
+    const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
+    for (int j = 0; j < 3; ++j) {
+      const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+      out[3 * i + j] = q[3 * i1 + j1] * q[3 * i2 + j2] - q[3 * i1 + j2] * q[3 * i2 + j1];
+    }
+  }
+}
+
+// Newton's iteration on as many matrices at once as a vector has lanes. With singular values s
+// (the last one negative where J is mirrored), J + cofactor(J) has s1 + s2 s3, s2 + s3 s1,
+// s3 + s1 s2 in the same directions, so the same closest rotation, but is far from singular even
+// where J has rank 2: a few steps do, without scaling. What is not there after kSteps gets NaN and
+// is done by itself.
+template <int Bytes>
+SUPPLE_INLINE void newton(const double* from, double* to, Eigen::Index count) {
+  using V = typename Lanes<double, Bytes>::type;
+  constexpr int kLanes = Lanes<double, Bytes>::count;
+  constexpr int kSteps = 9;
+  V q[9], cofactor[9], change{}, square{};
+  for (int e = 0; e < 9; ++e) {
+    for (int l = 0; l < kLanes; ++l) {
+      q[e][l] = l < count ? from[9 * l + e] : (e % 4 == 0 ? 1.0 : 0.0);
+    }
+    square += q[e] * q[e];
+  }
+  V scale;
+  for (int l = 0; l < kLanes; ++l) {
+    scale[l] = std::sqrt(3.0 / square[l]);
+  }
+  for (int e = 0; e < 9; ++e) {
+    q[e] *= scale;
+  }
+  cofactors(q, cofactor);
+  for (int e = 0; e < 9; ++e) {
+    q[e] = 0.5 * (q[e] + cofactor[e]);
+  }
+  for (int step = 0; step < kSteps; ++step) {
+    cofactors(q, cofactor);
+    const V determinant = q[0] * cofactor[0] + q[1] * cofactor[1] + q[2] * cofactor[2];
+    const V half_inverse = 0.5 / determinant;
+    change = V{};
+    for (int e = 0; e < 9; ++e) {
+      const V next = 0.5 * q[e] + half_inverse * cofactor[e];
+      const V moved = next - q[e];
+      change += moved * moved;
+      q[e] = next;
+    }
+    bool done = true;
+    for (int l = 0; l < kLanes; ++l) {
+      done = done && change[l] < 1e-20;  // quadratic: the next step would be within rounding
+    }
+    if (done) {
+      break;
+    }
+  }
+  cofactors(q, cofactor);
+  const V determinant = q[0] * cofactor[0] + q[1] * cofactor[1] + q[2] * cofactor[2];
+  for (int l = 0; l < kLanes && l < count; ++l) {
+    const bool good = change[l] < 1e-20 && determinant[l] > 0.5;
+    for (int e = 0; e < 9; ++e) {
+      to[9 * l + e] = good ? q[e][l] : std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+}
+
+SUPPLE_AVX512 void newton_avx512(const double* from, double* to, Eigen::Index count) {
+  newton<64>(from, to, count);
+}
+SUPPLE_AVX2 void newton_avx2(const double* from, double* to, Eigen::Index count) {
+  newton<32>(from, to, std::min<Eigen::Index>(count, 4));
+  if (count > 4) {
+    newton<32>(from + 36, to + 36, count - 4);
+  }
+}
+void newton_plain(const double* from, double* to, Eigen::Index count) {
+  for (Eigen::Index i = 0; i < count; i += 2) {
+    newton<16>(from + 9 * i, to + 9 * i, count - i);
+  }
+}
+
+}  // namespace
+
 MatrixField closest_rotations(const MatrixField& jacobians) {
+  static const auto kernel = best_kernel(&newton_avx512, &newton_avx2, &newton_plain);
+  constexpr Eigen::Index kTogether = 8;
   MatrixField rotations(jacobians.rows(), 9);
 #pragma omp parallel for schedule(static)
-  for (Eigen::Index f = 0; f < jacobians.rows(); ++f) {
-    matrix_at(rotations, f) = closest_rotation(matrix_at(jacobians, f));
+  for (Eigen::Index first = 0; first < jacobians.rows(); first += kTogether) {
+    const Eigen::Index count = std::min(kTogether, jacobians.rows() - first);
+    kernel(jacobians.row(first).data(), rotations.row(first).data(), count);
+    for (Eigen::Index f = first; f < first + count; ++f) {
+      if (std::isnan(rotations(f, 0))) {
+        matrix_at(rotations, f) = closest_rotation(matrix_at(jacobians, f));
+      }
+    }
   }
   return rotations;
 }

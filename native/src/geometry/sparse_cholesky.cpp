@@ -33,9 +33,20 @@ class EigenFactor : public Factor {
   Eigen::Index entries() const override {
     return factor_.matrixL().nestedExpression().nonZeros() + factor_.vectorD().size();
   }
-  RowMatrix<double> solve(const RowMatrix<double>& rhs) const override {
-    const Eigen::MatrixXd ordered = place_.inverse() * rhs;
-    return place_ * factor_.solve(ordered);
+  RowMatrix<double> solve(const RowMatrix<double>& rhs, Substitution part) const override {
+    Eigen::MatrixXd x = rhs;
+    const auto root = factor_.vectorD().cwiseSqrt();
+    if (part != Substitution::backward) {
+      x = place_.inverse() * x;
+      factor_.matrixL().solveInPlace(x);
+      x = root.cwiseInverse().asDiagonal() * x;
+    }
+    if (part != Substitution::forward) {
+      x = root.cwiseInverse().asDiagonal() * x;
+      factor_.matrixU().solveInPlace(x);
+      x = place_ * x;
+    }
+    return x;
   }
 
  private:
@@ -250,13 +261,27 @@ Eigen::Index SparseCholesky::factor_entries() const {
   return impl_->factor == nullptr ? 0 : impl_->factor->entries();
 }
 
-RowMatrix<double> SparseCholesky::solve(const RowMatrix<double>& rhs) const {
-  if (rhs.rows() != size()) {
-    throw Error(ErrorCode::wrong_shape, "The system has " + std::to_string(size()) +
-                                            " rows, the right-hand side " +
-                                            std::to_string(rhs.rows()) + ".");
+struct SparseCholesky::Solve {
+  static RowMatrix<double> run(const SparseCholesky& cholesky, const RowMatrix<double>& rhs,
+                               Substitution part) {
+    if (rhs.rows() != cholesky.size()) {
+      throw Error(ErrorCode::wrong_shape, "The system has " + std::to_string(cholesky.size()) +
+                                              " rows, the right-hand side " +
+                                              std::to_string(rhs.rows()) + ".");
+    }
+    const auto& factor = cholesky.impl_->factor;
+    return factor == nullptr || rhs.cols() == 0 ? rhs : factor->solve(rhs, part);
   }
-  return impl_->factor == nullptr || rhs.cols() == 0 ? rhs : impl_->factor->solve(rhs);
+};
+
+RowMatrix<double> SparseCholesky::solve(const RowMatrix<double>& rhs) const {
+  return Solve::run(*this, rhs, Substitution::both);
+}
+RowMatrix<double> SparseCholesky::forward(const RowMatrix<double>& rhs) const {
+  return Solve::run(*this, rhs, Substitution::forward);
+}
+RowMatrix<double> SparseCholesky::backward(const RowMatrix<double>& half) const {
+  return Solve::run(*this, half, Substitution::backward);
 }
 
 }  // namespace supple

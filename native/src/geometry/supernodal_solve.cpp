@@ -127,38 +127,43 @@ SUPPLE_INLINE void backward(const SupernodalFactor& factor, double* panel) {
 }
 
 template <int Width, int Bytes>
-SUPPLE_INLINE void solve(const SupernodalFactor& factor, double* panel) {
-  forward<Width, Bytes>(factor, panel);
-  backward<Width, Bytes>(factor, panel);
+SUPPLE_INLINE void solve(const SupernodalFactor& factor, double* panel, Substitution part) {
+  if (part != Substitution::backward) {
+    forward<Width, Bytes>(factor, panel);
+  }
+  if (part != Substitution::forward) {
+    backward<Width, Bytes>(factor, panel);
+  }
 }
 
 template <int Width>
 struct Kernels {
-  SUPPLE_AVX512 static void avx512(const SupernodalFactor& factor, double* panel) {
-    solve<Width, (Width < 8 ? 32 : 64)>(factor, panel);
+  SUPPLE_AVX512 static void avx512(const SupernodalFactor& factor, double* panel,
+                                   Substitution part) {
+    solve<Width, (Width < 8 ? 32 : 64)>(factor, panel, part);
   }
-  SUPPLE_AVX2 static void avx2(const SupernodalFactor& factor, double* panel) {
-    solve<Width, 32>(factor, panel);
+  SUPPLE_AVX2 static void avx2(const SupernodalFactor& factor, double* panel, Substitution part) {
+    solve<Width, 32>(factor, panel, part);
   }
-  static void plain(const SupernodalFactor& factor, double* panel) {
-    solve<Width, 16>(factor, panel);
+  static void plain(const SupernodalFactor& factor, double* panel, Substitution part) {
+    solve<Width, 16>(factor, panel, part);
   }
-  static void best(const SupernodalFactor& factor, double* panel) {
+  static void best(const SupernodalFactor& factor, double* panel, Substitution part) {
     static const auto kernel = best_kernel(&avx512, &avx2, &plain);
-    kernel(factor, panel);
+    kernel(factor, panel, part);
   }
 };
 
 }  // namespace
 
-void solve_panel(const SupernodalFactor& factor, double* panel, int width) {
+void solve_panel(const SupernodalFactor& factor, double* panel, int width, Substitution part) {
   switch (width) {
     case 4:
-      return Kernels<4>::best(factor, panel);
+      return Kernels<4>::best(factor, panel, part);
     case 8:
-      return Kernels<8>::best(factor, panel);
+      return Kernels<8>::best(factor, panel, part);
     default:
-      return Kernels<16>::best(factor, panel);
+      return Kernels<16>::best(factor, panel, part);
   }
 }
 

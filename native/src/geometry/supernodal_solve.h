@@ -4,6 +4,8 @@
 
 #include <cstddef>
 
+#include "factor.h"
+
 namespace supple {
 
 /// L of A = L L^T as CHOLMOD lays it out. Supernode s has columns super[s]..super[s+1]-1; the rows
@@ -21,9 +23,9 @@ struct SupernodalFactor {
 /// Panels as wide as this many right-hand sides are solved for: 4, 8, 16.
 constexpr int kPanelWidths[] = {4, 8, 16};
 
-/// Solves L L^T X = B in place. panel: n x width, row-major, aligned to 64 bytes, in the factor's
-/// order; width: one of kPanelWidths. Each entry of L is read twice, for 2 * width products each:
-/// one column at a time, the reading alone would take longer.
-void solve_panel(const SupernodalFactor& factor, double* panel, int width);
+/// Solves L L^T X = B in place, or L X = B or L^T X = B alone. panel: n x width, row-major, aligned
+/// to 64 bytes, in the factor's order; width: one of kPanelWidths. Each entry of L is read twice,
+/// for 2 * width products each: one column at a time, the reading alone would take longer.
+void solve_panel(const SupernodalFactor& factor, double* panel, int width, Substitution part);
 
 }  // namespace supple

@@ -6,6 +6,20 @@
 
 namespace supple {
 
+CornerTable::CornerTable(const Faces& faces, Eigen::Index n)
+    : first(Eigen::VectorXi::Zero(n + 1)), corner(3 * faces.rows()) {
+  for (Eigen::Index i = 0; i < corner.size(); ++i) {
+    ++first[faces.data()[i] + 1];
+  }
+  for (Eigen::Index v = 0; v < n; ++v) {
+    first[v + 1] += first[v];
+  }
+  Eigen::VectorXi next = first;
+  for (int i = 0; i < corner.size(); ++i) {
+    corner[next[faces.data()[i]]++] = i;
+  }
+}
+
 SurfaceOperators::SurfaceOperators(const TriangleMesh& mesh)
     : SurfaceOperators(mesh.surface_vertices(), mesh.surface_faces(), mesh.component(),
                        mesh.component_count()) {}
@@ -23,15 +37,30 @@ SurfaceOperators::SurfaceOperators(Points vertices_in, Faces faces_in, Eigen::Ve
       laplacian(cotan_laplacian(vertices, faces)),
       mass(lumped_mass(vertices, faces)),
       divergence(supple::divergence(gradient(vertices, faces), face_areas)),
-      average(average_faces_to_vertices(faces, vertices.rows(), AveragingWeights::uniform,
-                                        face_areas)) {}
+      average(
+          average_faces_to_vertices(faces, vertices.rows(), AveragingWeights::uniform, face_areas)),
+      corners(faces, vertices.rows()) {}
 
 MatrixField SurfaceOperators::jacobians_of(const Points& moved) const {
   return jacobians(inverse_frames, moved, faces);
 }
 
 Points SurfaceOperators::divergence_of(const MatrixField& jacobians) const {
-  return divergence * stacked(jacobians);
+  Points result(vertices.rows(), 3);
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index v = 0; v < result.rows(); ++v) {
+    Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+    for (int i = corners.first[v]; i < corners.first[v + 1]; ++i) {
+      const int f = corners.corner[i] / 3, c = corners.corner[i] - 3 * f;
+      // Columns 0 and 1 of E^-1 are the gradients of the functions that are 1 at corners 1 and 2.
+      const auto inverse = matrix_at(inverse_frames, f);
+      const Eigen::Vector3d gradient =
+          c == 0 ? Eigen::Vector3d(-inverse.col(0) - inverse.col(1)) : inverse.col(c - 1).eval();
+      sum.noalias() += (face_areas[f] * gradient).transpose() * matrix_at(jacobians, f);
+    }
+    result.row(v) = sum;
+  }
+  return result;
 }
 
 MatrixField SurfaceOperators::divergence_backward(const Points& grad) const {

@@ -117,14 +117,13 @@ void PreparedMesh::store(const PreparedCache& cache, const std::string& key) {
   cache.store(key, kept.arrays(basis), notes);
 }
 
-const PreparedMesh::Biharmonic& PreparedMesh::biharmonic() const {
-  std::call_once(biharmonic_once_, [this] {
-    biharmonic_.matrix =
-        operators.laplacian * operators.mass.cwiseInverse().asDiagonal() * operators.laplacian;
-    biharmonic_.symbolic =
-        std::make_shared<const SymbolicCholesky>(biharmonic_.matrix, symbolic->backend());
+const std::shared_ptr<const PinnedLaplacian>& PreparedMesh::pinned() const {
+  std::call_once(pinned_once_, [this] {
+    pinned_ = std::make_shared<const PinnedLaplacian>(operators.laplacian, operators.mass,
+                                                      operators.component,
+                                                      operators.component_count, symbolic);
   });
-  return biharmonic_;
+  return pinned_;
 }
 
 std::shared_ptr<const NetworkContext<float>> PreparedMesh::context_for(

@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from supple_training.compare import against as builds
 from supple_training.compare import difference, machine, report, shapes, tasks
+from supple_training.compare.edits.command import edit
 from supple_training.compare.runner import TRAINING, Build, Comparison, Mesh, Settings
 from supple_training.console import console
 
@@ -196,6 +197,8 @@ def diff(
             raise typer.BadParameter(str(error), param_hint=name) from error
     raise typer.Exit(_show_difference(*documents, noise))
 
+
+app.command()(edit)
 
 if __name__ == "__main__":
     app()

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "supple/core/types.h"
 #include "supple/geometry/sparse_cholesky.h"
@@ -9,9 +10,9 @@
 namespace supple {
 
 /// A symmetric positive semidefinite system A X = B in which some rows of X are given ("held").
-/// The Poisson and biharmonic solves of this library are all of this form. Factored once for a set
-/// of held rows; a solve is two back-substitutions. Held rows stay in the matrix as rows of a
-/// diagonal one, so that one symbolic analysis serves every set of them.
+/// The Poisson solves of this library are all of this form. Factored once for a set of held rows; a
+/// solve is two back-substitutions. Held rows stay in the matrix as rows of a diagonal one, so that
+/// one symbolic analysis serves every set of them.
 class HeldSystem {
  public:
   /// matrix: n x n, definite once the held rows are taken out. held: distinct indices in [0, n).
@@ -20,6 +21,13 @@ class HeldSystem {
   /// `not_positive_definite`; `wrong_shape` for another pattern's analysis.
   HeldSystem(const SparseMatrix& matrix, const Eigen::VectorXi& held,
              std::shared_ptr<const SymbolicCholesky> symbolic = nullptr);
+  /// Most rows that `changed` takes; with more, a new factor costs less.
+  static constexpr Eigen::Index kMostChanges = 96;
+  /// The same system with other rows held, on the same factor: rows that are held now are
+  /// multipliers, rows that no longer are become unknowns beside it, and both together a small
+  /// dense system (a Schur complement). Nothing where more than kMostChanges rows differ from those
+  /// that were factored. Errors: as above.
+  std::optional<HeldSystem> changed(const Eigen::VectorXi& held) const;
 
   const Eigen::VectorXi& held() const { return held_; }
   /// rhs: n x 3 (held rows ignored). held_values: one row for each held index, in `held` order.
@@ -29,9 +37,13 @@ class HeldSystem {
   Points solve_backward(const Points& grad) const;
 
  private:
+  struct Factored;
+  struct Changes;
+  HeldSystem() = default;
+
+  std::shared_ptr<const Factored> factored_;
+  std::shared_ptr<const Changes> changes_;  // nullptr: none
   Eigen::VectorXi held_;
-  SparseMatrix coupling_;  // n x held
-  SparseCholesky factor_;
 };
 
 /// Poisson equation of a mesh without held vertices, W V = rhs, each component placed so that its

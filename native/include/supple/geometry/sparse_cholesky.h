@@ -92,8 +92,13 @@ class SparseCholesky {
   Eigen::Index factor_entries() const;
   /// n x c right-hand sides to n x c solutions; columns are shared among the threads.
   RowMatrix<double> solve(const RowMatrix<double>& rhs) const;
+  /// The two halves of `solve`, with A = P^T L L^T P: L^-1 P rhs, in the factor's own order of rows
+  /// (row i is that of `symbolic().ordering()[i]`), and P^T L^-T of such rows.
+  RowMatrix<double> forward(const RowMatrix<double>& rhs) const;
+  RowMatrix<double> backward(const RowMatrix<double>& half) const;
 
  private:
+  struct Solve;
   struct Impl;
   std::unique_ptr<const Impl> impl_;
 };

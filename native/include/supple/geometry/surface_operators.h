@@ -6,6 +6,16 @@
 
 namespace supple {
 
+/// The corners of faces at each vertex: those of vertex v are corner[first[v]] to
+/// corner[first[v + 1] - 1], ascending, corner c of face f being 3 f + c. What is summed over them
+/// needs no scattering, so threads share it and the sum is always the same.
+struct CornerTable {
+  CornerTable() = default;
+  CornerTable(const Faces& faces, Eigen::Index n);
+  Eigen::VectorXi first;   ///< n + 1
+  Eigen::VectorXi corner;  ///< 3 m
+};
+
 /// Every operator of a rest surface that the tasks use, built once. n vertices, m faces, area 1.
 struct SurfaceOperators {
   explicit SurfaceOperators(const TriangleMesh& mesh);
@@ -24,6 +34,7 @@ struct SurfaceOperators {
   Eigen::VectorXd mass;        ///< n, diagonal of M
   SparseMatrix divergence;     ///< n x 3m, grad^T A
   SparseRowMatrix average;     ///< n x m, uniform face -> vertex averaging
+  CornerTable corners;
 
   /// m x 9 Jacobians of moved n x 3 vertices.
   MatrixField jacobians_of(const Points& moved) const;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Editing: handles in, a posed mesh out. Source: the paper, section 4.4.
+// Editing: handles in, a posed mesh out. Source: the paper, section 4.4; docs/method.md says where
+// this differs.
 #pragma once
 
 #include <memory>
@@ -9,6 +10,7 @@
 
 #include "supple/core/progress.h"
 #include "supple/geometry/held_system.h"
+#include "supple/geometry/pinned_laplacian.h"
 #include "supple/learning/network.h"
 #include "supple/tasks/prepared_mesh.h"
 
@@ -26,12 +28,12 @@ struct HandleTarget {
   std::optional<Points> positions;        ///< one row a vertex of the handle
 };
 
-enum class EditMode {
-  natural,  ///< ends with the network's Jacobians
-  stiff,    ///< ends with local-global passes towards rotations: least distortion
+enum class EditMethod {
+  supple,  ///< the suggestion, the network, and passes towards least distortion
+  arap,    ///< as rigid as possible, spokes and rims, from the same suggestion to its minimum
 };
 /// Errors: `bad_option` for any other name.
-EditMode edit_mode(const std::string& name);
+EditMethod edit_method(const std::string& name);
 
 enum class LoosePieces {
   follow,  ///< a component without a handle moves rigidly with the nearest point of one that has
@@ -40,19 +42,25 @@ enum class LoosePieces {
 };
 
 struct EditOptions {
-  EditMode mode = EditMode::natural;
-  int rounds = 3;  ///< of closest rotations and Poisson
-  /// How many of the rounds, the last ones, put the network in between. It is trained on what
-  /// rounds without it leave, not on its own results.
+  EditMethod method = EditMethod::supple;
+  /// From 0, natural: the network's Jacobians, to 1, stiff: least distortion. Between them the
+  /// network's stretch counts for less and there are more passes. `supple` only.
+  double stiffness = 0.0;
+  int rounds = 2;  ///< of closest rotations and Poisson
+  /// How many of the rounds, the last ones, put the network in between.
   int network_rounds = 1;
-  int passes = 40;  ///< of closest rotations, Poisson, after the rounds; `stiff` only
+  /// Passes after the rounds that keep the network's stretch and let it turn with the result.
+  int polish = 1;
+  /// Most passes towards least distortion, of `arap` and where stiffness is 1; fewer where they
+  /// have converged.
+  int passes = 80;
   bool network = true;
   LoosePieces loose_pieces = LoosePieces::follow;
 };
 
 /// What was done, stage by stage.
 struct EditReport {
-  int rounds = 0, passes = 0;
+  int rounds = 0, polish = 0, passes = 0;
   bool network = false;
   double suggestion_milliseconds = 0.0, rounds_milliseconds = 0.0, passes_milliseconds = 0.0,
          total_milliseconds = 0.0;
@@ -63,16 +71,22 @@ struct EditResult {
   EditReport report;
 };
 
-/// Handles bound to a prepared mesh: the systems are factored once, and solved for any targets.
+class EditSession;
+
+/// Handles bound to a prepared mesh, for any targets. Immutable.
 class Editor {
  public:
   /// network: nullptr to edit without one (the closest rotations themselves are the Jacobians).
+  /// former: an editor of the same prepared mesh with other handles; what the two share is not
+  /// computed again, and the result is the same to rounding.
   /// Errors: `no_handles`, `empty_handle`, `index_out_of_range`, `overlapping_handles`;
   /// `bad_option` if the network takes another signal. Messages name the handle.
   Editor(std::shared_ptr<const PreparedMesh> prepared, std::vector<Handle> handles,
-         std::shared_ptr<const LocalJacobianNetwork<float>> network, ProgressRange progress = {});
+         std::shared_ptr<const LocalJacobianNetwork<float>> network, ProgressRange progress = {},
+         const Editor* former = nullptr);
 
-  /// targets: one a handle, in order. Safe to call from several threads.
+  /// targets: one a handle, in order. The same bytes for the same targets, options and number of
+  /// threads. Safe to call from several threads.
   /// Errors: `wrong_shape`, `not_finite`, `singular_matrix`, `bad_option`, `cancelled`.
   EditResult solve(const std::vector<HandleTarget>& targets, const EditOptions& options = {},
                    ProgressRange progress = {}) const;
@@ -80,24 +94,44 @@ class Editor {
   const std::vector<Handle>& handles() const { return handles_; }
 
  private:
-  /// Targets of every handle vertex, in handle order, in the caller's units.
-  Points target_positions(const std::vector<HandleTarget>& targets) const;
-  /// The one rigid motion nearest to what all handles ask, on surface vertices.
-  Points moved_as_one(const std::vector<HandleTarget>& targets, const Points& held) const;
-  /// The smooth first guess: the rigid motion, then biharmonic interpolation of what is left.
-  Points suggestion(const Points& rigid, const Points& held) const;
-  void place_loose_pieces(Points& moved, const MatrixField& vertex_jacobians,
-                          LoosePieces choice) const;
+  friend class EditSession;
+  void bind(const Editor* former, const ProgressRange& progress);
 
   std::shared_ptr<const PreparedMesh> prepared_;
   std::vector<Handle> handles_;
   std::shared_ptr<const LocalJacobianNetwork<float>> network_;
   std::shared_ptr<const NetworkContext<float>> context_;
-  Eigen::VectorXi held_;  // surface vertices in the systems' held set: handles, then loose pieces
+  Eigen::VectorXi held_;          // surface vertices: the handles', then one of each loose piece
   Eigen::VectorXi held_slot_;     // for each handle vertex in order: its place in held_, or -1
+  Eigen::VectorXi held_handle_;   // for each of held_: its handle, or -1
   Eigen::Index handle_rows_ = 0;  // how many of held_ belong to handles
   Eigen::VectorXi anchor_;        // per component: surface vertex it follows, -1 if it has a handle
-  std::unique_ptr<HeldSystem> biharmonic_, poisson_;
+  Eigen::VectorXi guides_;        // places in held_ whose rotations the suggestion interpolates
+  std::shared_ptr<const HeldSystem> poisson_;
+  std::shared_ptr<const BiharmonicInterpolation> interpolation_;
+};
+
+/// An edit that goes on while its targets change: a drag. Not safe to share between threads.
+class EditSession {
+ public:
+  /// Errors: `bad_option`.
+  EditSession(std::shared_ptr<const Editor> editor, const EditOptions& options);
+  ~EditSession();
+  EditSession(EditSession&&) noexcept;
+
+  /// New targets; what was done for the last ones is dropped. Errors: those of `Editor::solve`.
+  void aim(const std::vector<HandleTarget>& targets);
+  /// Works until about this many milliseconds have passed, at least to a usable pose, and returns
+  /// it. Stopped at any time and called again, it ends where `Editor::solve` does. Errors:
+  /// `bad_option` before the first `aim`.
+  EditResult advance(double milliseconds);
+  /// Whether another `advance` would change nothing.
+  bool settled() const;
+
+ private:
+  friend class Editor;
+  struct State;
+  std::unique_ptr<State> state_;
 };
 
 }  // namespace supple

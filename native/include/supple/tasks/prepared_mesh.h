@@ -8,6 +8,7 @@
 
 #include "supple/core/progress.h"
 #include "supple/geometry/mesh.h"
+#include "supple/geometry/pinned_laplacian.h"
 #include "supple/geometry/sparse_cholesky.h"
 #include "supple/geometry/surface_operators.h"
 #include "supple/learning/network.h"
@@ -44,21 +45,16 @@ struct PreparedMesh {
   /// The context a network is evaluated with: `paper` needs every vertex and is built when first
   /// asked.
   std::shared_ptr<const NetworkContext<float>> context_for(const Architecture& architecture) const;
-  /// W M^-1 W and the analysis of its pattern, which reaches two rings and is best ordered by
-  /// itself (in the Laplacian's order a factor has 3 times the work); made when first asked.
-  struct Biharmonic {
-    SparseMatrix matrix;
-    std::shared_ptr<const SymbolicCholesky> symbolic;
-  };
-  const Biharmonic& biharmonic() const;
+  /// The factor that any handles are held with; made when first asked.
+  const std::shared_ptr<const PinnedLaplacian>& pinned() const;
 
  private:
   void compute(const PrepareOptions& options, const ProgressRange& progress);
   bool load(const PrepareOptions& options, const PreparedCache& cache, const std::string& key);
   void store(const PreparedCache& cache, const std::string& key);
 
-  mutable std::once_flag biharmonic_once_;
-  mutable Biharmonic biharmonic_;
+  mutable std::once_flag pinned_once_;
+  mutable std::shared_ptr<const PinnedLaplacian> pinned_;
 };
 
 }  // namespace supple

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <limits>
+
+#include "handle_checks.h"
+#include "suggestion.h"
+#include "supple/core/error.h"
+#include "supple/geometry/nearest.h"
+#include "supple/tasks/edit.h"
+
+namespace supple {
+namespace {
+
+Points rows_of(const Points& points, const std::vector<int>& indices, size_t first) {
+  Points result(static_cast<Eigen::Index>(indices.size() - first), 3);
+  for (Eigen::Index i = 0; i < result.rows(); ++i) {
+    result.row(i) = points.row(indices[first + static_cast<size_t>(i)]);
+  }
+  return result;
+}
+
+Eigen::VectorXi vector_of(const std::vector<int>& values) {
+  return Eigen::Map<const Eigen::VectorXi>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+// Per component without a handle: the point nearest to it on one that has one; otherwise -1.
+Eigen::VectorXi anchors(const SurfaceOperators& operators, const std::vector<bool>& has_handle) {
+  Eigen::VectorXi anchor = Eigen::VectorXi::Constant(operators.component_count, -1);
+  std::vector<int> firm, loose;
+  for (int i = 0; i < operators.component.size(); ++i) {
+    (has_handle[static_cast<size_t>(operators.component[i])] ? firm : loose).push_back(i);
+  }
+  if (loose.empty()) {
+    return anchor;
+  }
+  const NearestPoints::Result nearest = NearestPoints(rows_of(operators.vertices, firm, 0))
+                                            .query(rows_of(operators.vertices, loose, 0));
+  Eigen::VectorXd best =
+      Eigen::VectorXd::Constant(operators.component_count, std::numeric_limits<double>::max());
+  for (size_t i = 0; i < loose.size(); ++i) {
+    const int piece = operators.component[loose[i]];
+    const auto row = static_cast<Eigen::Index>(i);
+    if (nearest.squared_distance[row] < best[piece] * (1.0 - 1e-9)) {  // ties: the first
+      best[piece] = nearest.squared_distance[row];
+      anchor[piece] = firm[static_cast<size_t>(nearest.index[row])];
+    }
+  }
+  return anchor;
+}
+
+}  // namespace
+
+EditMethod edit_method(const std::string& name) {
+  if (name == "supple") {
+    return EditMethod::supple;
+  }
+  if (name == "arap") {
+    return EditMethod::arap;
+  }
+  throw Error(ErrorCode::bad_option, "'" + name + "' is no method. Use 'supple' or 'arap'.");
+}
+
+Editor::Editor(std::shared_ptr<const PreparedMesh> prepared, std::vector<Handle> handles,
+               std::shared_ptr<const LocalJacobianNetwork<float>> network, ProgressRange progress,
+               const Editor* former)
+    : prepared_(std::move(prepared)), handles_(std::move(handles)), network_(std::move(network)) {
+  check_handles(handles_, prepared_->mesh.vertices().rows());
+  if (network_ != nullptr) {
+    if (network_->architecture().signal != SignalKind::rotation) {
+      throw Error(
+          ErrorCode::bad_option,
+          "This network takes the spectral signal. Editing needs one trained on rotations.");
+    }
+    context_ = prepared_->context_for(network_->architecture());
+  }
+  bind(former != nullptr && former->prepared_ == prepared_ ? former : nullptr, progress);
+  progress.report(1.0);
+}
+
+void Editor::bind(const Editor* former, const ProgressRange& progress) {
+  const TriangleMesh& mesh = prepared_->mesh;
+  const SurfaceOperators& operators = prepared_->operators;
+  std::vector<int> held, slots, groups;
+  std::vector<bool> has_handle(static_cast<size_t>(operators.component_count), false);
+  for (size_t h = 0; h < handles_.size(); ++h) {
+    for (const int vertex : handles_[h].vertices) {
+      const int surface = mesh.surface_vertex()[vertex];
+      slots.push_back(surface < 0 ? -1 : static_cast<int>(held.size()));
+      if (surface >= 0) {
+        held.push_back(surface);
+        groups.push_back(static_cast<int>(h));
+        has_handle[static_cast<size_t>(operators.component[surface])] = true;
+      }
+    }
+  }
+  if (held.empty()) {
+    throw Error(ErrorCode::no_handles,
+                "No handle has a vertex of a face with an area, so nothing can follow them.");
+  }
+  handle_rows_ = static_cast<Eigen::Index>(held.size());
+  std::vector<int> guides;
+  for (size_t first = 0; first < held.size();) {  // a handle's rows are contiguous
+    size_t last = first;
+    while (last < held.size() && groups[last] == groups[first]) {
+      ++last;
+    }
+    for (const int place :
+         far_apart(rows_of(operators.vertices, {held.begin() + first, held.begin() + last}, 0))) {
+      guides.push_back(static_cast<int>(first) + place);
+    }
+    first = last;
+  }
+
+  // Loose pieces go with the whole in the solves and are placed afterwards.
+  anchor_ = anchors(operators, has_handle);
+  std::vector<bool> met(has_handle);
+  for (int i = 0; i < operators.component.size(); ++i) {
+    const auto piece = static_cast<size_t>(operators.component[i]);
+    if (!met[piece]) {
+      met[piece] = true;
+      guides.push_back(static_cast<int>(held.size()));
+      held.push_back(i);
+      groups.push_back(-1);
+    }
+  }
+  held_ = vector_of(held);
+  held_slot_ = vector_of(slots);
+  held_handle_ = vector_of(groups);
+
+  progress.report(0.1);
+  std::vector<int> points;
+  std::vector<int> kept;  // a component whose handle has no guide of its own gets one
+  std::vector<bool> guided(static_cast<size_t>(operators.component_count), false);
+  for (const int guide : guides) {
+    guided[static_cast<size_t>(operators.component[held[static_cast<size_t>(guide)]])] = true;
+  }
+  for (size_t i = 0; i < held.size(); ++i) {
+    const auto piece = static_cast<size_t>(operators.component[held[i]]);
+    if (!guided[piece]) {
+      guided[piece] = true;
+      guides.push_back(static_cast<int>(i));
+    }
+  }
+  guides_ = vector_of(guides);
+  for (const int guide : guides) {
+    points.push_back(held[static_cast<size_t>(guide)]);
+  }
+  if (former != nullptr) {
+    if (std::optional<HeldSystem> changed = former->poisson_->changed(held_)) {
+      poisson_ = std::make_shared<const HeldSystem>(std::move(*changed));
+    }
+  }
+  if (poisson_ == nullptr) {
+    poisson_ = std::make_shared<const HeldSystem>(operators.laplacian, held_, prepared_->symbolic);
+  }
+  progress.report(0.5);
+  interpolation_ = std::make_shared<const BiharmonicInterpolation>(
+      prepared_->pinned(), vector_of(points),
+      former == nullptr ? nullptr : former->interpolation_.get());
+}
+
+}  // namespace supple

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "energies.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "supple/geometry/jacobians.h"
+#include "supple/geometry/mesh.h"
+
+namespace supple {
+namespace {
+
+// Below this part of its area a face's distortion goes on along its tangent.
+constexpr double kSmallest = 0.1;
+// A fold's faces resist bending this many times more, each time it is found.
+constexpr double kStiffer = 4.0;
+
+Matrix3 tangential(const SurfaceOperators& operators, const Points& moved, Eigen::Index f) {
+  const auto inverse = matrix_at(operators.inverse_frames, f);
+  const auto face = operators.faces.row(f);
+  const Eigen::RowVector3d origin = moved.row(face[0]);
+  return inverse.col(0) * (moved.row(face[1]) - origin) +
+         inverse.col(1) * (moved.row(face[2]) - origin);
+}
+
+MatrixField tangential(const SurfaceOperators& operators, const Points& moved) {
+  MatrixField result(operators.faces.rows(), 9);
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index f = 0; f < result.rows(); ++f) {
+    matrix_at(result, f) = tangential(operators, moved, f);
+  }
+  return result;
+}
+
+// n x 9: the rotation of each vertex.
+MatrixField vertex_rotations(const SurfaceOperators& operators, const MatrixField& jacobians) {
+  const CornerTable& corners = operators.corners;
+  MatrixField sums(operators.vertices.rows(), 9);
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index v = 0; v < sums.rows(); ++v) {
+    Eigen::Matrix<double, 1, 9> sum = Eigen::Matrix<double, 1, 9>::Zero();
+    double area = 0.0;
+    for (int i = corners.first[v]; i < corners.first[v + 1]; ++i) {
+      const int f = corners.corner[i] / 3;
+      area += operators.face_areas[f];
+      sum += operators.face_areas[f] * jacobians.row(f);
+    }
+    sums.row(v) = sum / area;
+  }
+  return closest_rotations(sums);
+}
+
+// The mean of the rotations at a face's corners, its normal's part taken out.
+Matrix3 face_target(const SurfaceOperators& operators, const MatrixField& rotations,
+                    Eigen::Index f) {
+  const auto face = operators.faces.row(f);
+  Matrix3 mean = (matrix_at(rotations, face[0]) + matrix_at(rotations, face[1]) +
+                  matrix_at(rotations, face[2])) /
+                 3.0;
+  const Eigen::RowVector3d normal = operators.face_normals.row(f);
+  mean -= normal.transpose() * (normal * mean);
+  return mean;
+}
+
+}  // namespace
+
+double ArapEnergy::evaluate(const Points& moved, Points& gradient) const {
+  const MatrixField jacobians = tangential(operators_, moved);
+  const MatrixField rotations = vertex_rotations(operators_, jacobians);
+  MatrixField stress(jacobians.rows(), 9);
+  Eigen::VectorXd value(jacobians.rows());
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index f = 0; f < stress.rows(); ++f) {
+    const auto t = matrix_at(jacobians, f);
+    const Matrix3 target = face_target(operators_, rotations, f);
+    value[f] = t.squaredNorm() + 2.0 - 2.0 * t.cwiseProduct(target).sum();
+    matrix_at(stress, f) = 2.0 * (t - target);
+  }
+  gradient = operators_.divergence_of(stress);
+  return operators_.face_areas.dot(value);
+}
+
+StiffEnergy::StiffEnergy(const SurfaceOperators& operators)
+    : operators_(operators),
+      bending_(Eigen::VectorXd::Constant(operators.faces.rows(), kBending)),
+      over_at_rest_(turned_over(operators.vertices)) {}
+
+double StiffEnergy::evaluate(const Points& moved, Points& gradient) const {
+  const MatrixField jacobians = tangential(operators_, moved);
+  const MatrixField rotations = vertex_rotations(operators_, jacobians);
+  MatrixField stress(jacobians.rows(), 9);
+  Eigen::VectorXd value(jacobians.rows());
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index f = 0; f < stress.rows(); ++f) {
+    const Matrix3 t = matrix_at(jacobians, f);
+    const Matrix3 target = face_target(operators_, rotations, f);
+    // With the singular values s1, s2: a = s1^2 + s2^2, d = s1 s2, and
+    // s1^2 + s2^2 + s1^-2 + s2^-2 = a (1 + d^-2).
+    const Matrix3 metric = t.transpose() * t;
+    const double a = metric.trace();
+    const double d = std::sqrt(std::max(0.5 * (a * a - metric.squaredNorm()), 1e-20));
+    const double least = std::max(d, kSmallest);
+    const double slope = -2.0 / (least * least * least);
+    const double inverse = 1.0 / (least * least) + slope * (d - least);
+    const Matrix3 grad_d = (a * t - t * metric) / d;
+    const double weight = bending_[f];
+    value[f] = a * (1.0 + inverse) - 4.0 + weight * (a + 2.0 - 2.0 * t.cwiseProduct(target).sum());
+    matrix_at(stress, f) =
+        (2.0 + 2.0 * inverse + 2.0 * weight) * t + (a * slope) * grad_d - (2.0 * weight) * target;
+  }
+  gradient = operators_.divergence_of(stress);
+  return operators_.face_areas.dot(value);
+}
+
+Eigen::VectorXi StiffEnergy::turned_over(const Points& points) const {
+  const Points normals = face_normals(points, operators_.faces);
+  const CornerTable& corners = operators_.corners;
+  Points around(points.rows(), 3);
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index v = 0; v < around.rows(); ++v) {
+    around.row(v).setZero();
+    for (int i = corners.first[v]; i < corners.first[v + 1]; ++i) {
+      around.row(v) += normals.row(corners.corner[i] / 3);
+    }
+  }
+  Eigen::VectorXi result(normals.rows());
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index f = 0; f < result.size(); ++f) {
+    const Eigen::RowVector3d others = around.row(operators_.faces(f, 0)) +
+                                      around.row(operators_.faces(f, 1)) +
+                                      around.row(operators_.faces(f, 2)) - 3.0 * normals.row(f);
+    result[f] = normals.row(f).dot(others) < 0.0 ? 1 : 0;
+  }
+  return result;
+}
+
+int StiffEnergy::stiffen_folds(const Points& moved) {
+  const Eigen::VectorXi over = turned_over(moved);
+  const CornerTable& corners = operators_.corners;
+  std::vector<bool> near(static_cast<size_t>(over.size()), false);
+  int count = 0;
+  for (Eigen::Index f = 0; f < over.size(); ++f) {
+    if (over[f] == 0 || over_at_rest_[f] != 0) {
+      continue;
+    }
+    ++count;
+    for (int c = 0; c < 3; ++c) {
+      const int v = operators_.faces(f, c);
+      for (int i = corners.first[v]; i < corners.first[v + 1]; ++i) {
+        near[static_cast<size_t>(corners.corner[i] / 3)] = true;
+      }
+    }
+  }
+  for (Eigen::Index f = 0; f < over.size(); ++f) {
+    if (near[static_cast<size_t>(f)]) {
+      bending_[f] *= kStiffer;
+    }
+  }
+  return count;
+}
+
+}  // namespace supple

@@ -1,0 +1,386 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <chrono>
+#include <cmath>
+
+#include "descent.h"
+#include "handle_checks.h"
+#include "suggestion.h"
+#include "supple/core/error.h"
+#include "supple/geometry/jacobians.h"
+#include "supple/tasks/edit.h"
+
+namespace supple {
+namespace {
+
+// Passes between two looks for folds, and how often they are stiffened at most.
+constexpr int kFoldInterval = 15;
+constexpr int kMostStiffenings = 8;
+
+class Stopwatch {
+ public:
+  double milliseconds() const {
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start_)
+        .count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+void check_options(const EditOptions& options) {
+  if (options.rounds < 0 || options.passes < 0 || options.network_rounds < 0 ||
+      options.polish < 0) {
+    throw Error(ErrorCode::bad_option, "Rounds, polish and passes must be 0 or more.");
+  }
+  if (!(options.stiffness >= 0.0 && options.stiffness <= 1.0)) {
+    throw Error(ErrorCode::bad_option, "The stiffness is " + std::to_string(options.stiffness) +
+                                           "; it must be from 0 (natural) to 1 (stiff).");
+  }
+}
+
+Matrix3 row_rotation(const Eigen::Matrix4d& matrix) {
+  return closest_rotation(Matrix3(matrix.topLeftCorner<3, 3>().transpose()));
+}
+
+}  // namespace
+
+struct EditSession::State {
+  State(std::shared_ptr<const Editor> editor_in, const EditOptions& options_in)
+      : editor(std::move(editor_in)), options(options_in) {
+    check_options(options);
+    const bool supple = options.method == EditMethod::supple;
+    with_network = supple && options.network && editor->network_ != nullptr && options.rounds > 0 &&
+                   options.network_rounds > 0;
+    polish = supple ? options.polish : 0;
+    passes =
+        supple
+            ? static_cast<int>(std::lround(options.stiffness * options.stiffness * options.passes))
+            : options.passes;
+  }
+
+  const SurfaceOperators& operators() const { return editor->prepared_->operators; }
+  int step_count() const { return 1 + options.rounds + polish + passes; }
+  /// Steps until there is a pose to show.
+  int usable() const { return 1 + options.rounds + polish; }
+  bool settled() const { return next >= step_count(); }
+  void aim(const std::vector<HandleTarget>& targets);
+  void step();
+  EditResult result() const;
+
+  void find_guide_rotations(const Points& handles_rest,
+                            const std::vector<std::optional<Matrix3>>& known);
+  Points smooth_displacement() const;
+  void suggest();
+  void round(bool use_network);
+  void polish_pass();
+  void pass();
+
+  std::shared_ptr<const Editor> editor;
+  EditOptions options;
+  bool with_network = false, aimed = false;
+  int polish = 0, passes = 0;
+
+  Points positions;  // of every handle vertex in handle order, caller's units
+  Points held;       // of editor->held_, surface units
+  RigidMotion whole;
+  std::vector<Matrix3> guide_rotations;
+  Points moved;
+  MatrixField stretch;  // of the last round with the network
+  std::unique_ptr<DeformationEnergy> energy;
+  std::unique_ptr<Descent> descent;
+  int stiffenings = 0;
+  int next = 0;  // step
+  EditReport report;
+
+ private:
+  Points target_positions(const std::vector<HandleTarget>& targets) const;
+  void place_loose_pieces(Points& placed, const MatrixField& vertex_jacobians) const;
+};
+
+Points EditSession::State::target_positions(const std::vector<HandleTarget>& targets) const {
+  const Points& rest = editor->prepared_->mesh.vertices();
+  Points result(editor->held_slot_.size(), 3);
+  Eigen::Index row = 0;
+  for (size_t h = 0; h < targets.size(); ++h) {
+    const Eigen::VectorXi& vertices = editor->handles_[h].vertices;
+    for (Eigen::Index i = 0; i < vertices.size(); ++i, ++row) {
+      const Eigen::RowVector3d point = rest.row(vertices[i]);
+      if (targets[h].matrix) {
+        result.row(row) = (targets[h].matrix->topLeftCorner<3, 3>() * point.transpose() +
+                           targets[h].matrix->topRightCorner<3, 1>())
+                              .transpose();
+      } else if (targets[h].positions) {
+        result.row(row) = targets[h].positions->row(i);
+      } else {
+        result.row(row) = point;
+      }
+    }
+  }
+  return result;
+}
+
+void EditSession::State::aim(const std::vector<HandleTarget>& targets) {
+  check_targets(editor->handles_, targets);
+  const Editor& e = *editor;
+  const Points& rest = operators().vertices;
+  positions = target_positions(targets);
+  const Points on_surface = e.prepared_->mesh.to_surface(positions);
+  held.resize(e.held_.size(), 3);
+  for (Eigen::Index i = 0; i < e.held_slot_.size(); ++i) {
+    if (e.held_slot_[i] >= 0) {
+      held.row(e.held_slot_[i]) = on_surface.row(i);
+    }
+  }
+  Points handles_rest(e.handle_rows_, 3);
+  for (Eigen::Index i = 0; i < e.handle_rows_; ++i) {
+    handles_rest.row(i) = rest.row(e.held_[i]);
+  }
+  const Matrix3 identity = Matrix3::Identity();
+  std::vector<Matrix3> turns;
+  std::vector<std::optional<Matrix3>> known(targets.size());
+  for (size_t h = 0; h < targets.size(); ++h) {
+    if (!targets[h].positions) {
+      known[h] = targets[h].matrix ? row_rotation(*targets[h].matrix) : identity;
+      turns.push_back(*known[h]);
+    }
+  }
+  whole = nearest_motion(handles_rest, held.topRows(e.handle_rows_), turns);
+  // Loose pieces go with the whole in the solves, so that one rigid motion of all stays one.
+  for (Eigen::Index i = e.handle_rows_; i < held.rows(); ++i) {
+    held.row(i) = whole(rest.row(e.held_[i]));
+  }
+
+  find_guide_rotations(handles_rest, known);
+  descent.reset();
+  energy.reset();
+  stretch.resize(0, 9);
+  stiffenings = 0;
+  next = 0;
+  report = EditReport{};
+  report.network = with_network;
+  aimed = true;
+}
+
+void EditSession::State::find_guide_rotations(const Points& handles_rest,
+                                              const std::vector<std::optional<Matrix3>>& known) {
+  const Editor& e = *editor;
+  guide_rotations.assign(static_cast<size_t>(e.guides_.size()), whole.rotation);
+  MatrixField smooth;  // Jacobians of the biharmonic displacement, for what positions leave open
+  for (Eigen::Index g = 0; g < e.guides_.size(); ++g) {
+    const Eigen::Index guide = e.guides_[g];
+    const int h = e.held_handle_[guide];
+    Matrix3& rotation = guide_rotations[static_cast<size_t>(g)];
+    if (h < 0) {
+      continue;
+    }
+    if (known[static_cast<size_t>(h)]) {
+      rotation = *known[static_cast<size_t>(h)];
+      continue;
+    }
+    if (smooth.rows() == 0) {
+      smooth = operators().jacobians_of(smooth_displacement());
+    }
+    Eigen::Index first = guide, last = guide;  // the handle's rows are contiguous
+    while (first > 0 && e.held_handle_[first - 1] == h) {
+      --first;
+    }
+    while (last < e.handle_rows_ && e.held_handle_[last] == h) {
+      ++last;
+    }
+    const Eigen::Matrix<double, 1, 9> around = vertex_average(operators(), smooth, e.held_[guide]);
+    rotation = rotation_around(handles_rest.middleRows(first, last - first),
+                               held.middleRows(first, last - first), handles_rest.row(guide),
+                               closest_rotation(Eigen::Map<const Matrix3>(around.data())));
+  }
+}
+
+// The rigid motion, and biharmonic interpolation of what the handles ask besides.
+Points EditSession::State::smooth_displacement() const {
+  const Points& rest = operators().vertices;
+  Points away(editor->guides_.size(), 3);
+  for (Eigen::Index g = 0; g < away.rows(); ++g) {
+    const int guide = editor->guides_[g];
+    away.row(g) = held.row(guide) - whole(rest.row(editor->held_[guide]));
+  }
+  Points result = editor->interpolation_->solve(away);
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index v = 0; v < result.rows(); ++v) {
+    result.row(v) += whole(rest.row(v));
+  }
+  return result;
+}
+
+void EditSession::State::suggest() {
+  const MatrixField rotations =
+      interpolated_rotations(operators(), *editor->interpolation_, guide_rotations, whole.rotation);
+  moved = editor->poisson_->solve(operators().divergence_of(rotations), held);
+}
+
+void EditSession::State::round(bool use_network) {
+  Signal signal = rotation_signal(operators().jacobians_of(moved));
+  if (!use_network) {
+    moved = editor->poisson_->solve(operators().divergence_of(signal.fields.front()), held);
+    return;
+  }
+  MatrixField jacobians = editor->network_->forward(*editor->context_, signal);
+  // J = S Q; towards the stiff end less of S, the network's stretch, is kept.
+  const MatrixField rotations = closest_rotations(jacobians);
+  stretch.resize(jacobians.rows(), 9);
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index f = 0; f < jacobians.rows(); ++f) {
+    const auto q = matrix_at(rotations, f);
+    const Matrix3 kept = (1.0 - options.stiffness) * matrix_at(jacobians, f) * q.transpose() +
+                         options.stiffness * Matrix3::Identity();
+    matrix_at(stretch, f) = kept;
+    matrix_at(jacobians, f) = kept * q;
+  }
+  moved = editor->poisson_->solve(operators().divergence_of(jacobians), held);
+}
+
+// Towards S Q with the rotation Q that has the least |J - S Q|; S is the identity without a
+// network.
+void EditSession::State::polish_pass() {
+  MatrixField jacobians = operators().jacobians_of(moved);
+  if (stretch.rows() == 0) {
+    jacobians = closest_rotations(jacobians);
+  } else {
+#pragma omp parallel for schedule(static)
+    for (Eigen::Index f = 0; f < jacobians.rows(); ++f) {
+      matrix_at(jacobians, f) =
+          (matrix_at(stretch, f).transpose() * matrix_at(jacobians, f)).eval();
+    }
+    jacobians = closest_rotations(jacobians);
+#pragma omp parallel for schedule(static)
+    for (Eigen::Index f = 0; f < jacobians.rows(); ++f) {
+      matrix_at(jacobians, f) = (matrix_at(stretch, f) * matrix_at(jacobians, f)).eval();
+    }
+  }
+  moved = editor->poisson_->solve(operators().divergence_of(jacobians), held);
+}
+
+void EditSession::State::pass() {
+  const bool stiff = options.method == EditMethod::supple;
+  if (descent == nullptr) {
+    if (stiff) {
+      energy = std::make_unique<StiffEnergy>(operators());
+    } else {
+      energy = std::make_unique<ArapEnergy>(operators());
+    }
+    descent = std::make_unique<Descent>(*energy, *editor->poisson_);
+  }
+  descent->pass(moved);
+  ++report.passes;
+  const bool look = descent->converged() || report.passes % kFoldInterval == 0;
+  if (stiff && look && stiffenings < kMostStiffenings && report.passes < passes) {
+    ++stiffenings;
+    if (static_cast<StiffEnergy&>(*energy).stiffen_folds(moved) > 0) {
+      descent->forget();
+    }
+  }
+  if (descent->converged()) {
+    next = step_count() - 1;  // nothing is left to do
+  }
+}
+
+void EditSession::State::step() {
+  const Stopwatch watch;
+  const int first_polish = 1 + options.rounds, first_pass = first_polish + polish;
+  if (next == 0) {
+    suggest();
+    report.suggestion_milliseconds += watch.milliseconds();
+  } else if (next < first_polish) {
+    round(with_network && next - 1 + options.network_rounds >= options.rounds);
+    ++report.rounds;
+    report.rounds_milliseconds += watch.milliseconds();
+  } else if (next < first_pass) {
+    polish_pass();
+    ++report.polish;
+    report.rounds_milliseconds += watch.milliseconds();
+  } else {
+    pass();
+    report.passes_milliseconds += watch.milliseconds();
+  }
+  ++next;
+  report.total_milliseconds += watch.milliseconds();
+}
+
+void EditSession::State::place_loose_pieces(Points& placed,
+                                            const MatrixField& vertex_jacobians) const {
+  const Points& rest = operators().vertices;
+  const Eigen::VectorXi& anchor = editor->anchor_;
+  if ((anchor.array() < 0).all()) {
+    return;
+  }
+  std::vector<Matrix3> turn(static_cast<size_t>(anchor.size()), Matrix3::Identity());
+  if (options.loose_pieces == LoosePieces::follow) {
+    for (Eigen::Index c = 0; c < anchor.size(); ++c) {
+      if (anchor[c] >= 0) {
+        turn[static_cast<size_t>(c)] = closest_rotation(matrix_at(vertex_jacobians, anchor[c]));
+      }
+    }
+  }
+  for (Eigen::Index v = 0; v < placed.rows(); ++v) {
+    const int piece = operators().component[v];
+    if (anchor[piece] < 0) {
+      continue;
+    }
+    placed.row(v) = options.loose_pieces == LoosePieces::stay
+                        ? Eigen::RowVector3d(rest.row(v))
+                        : placed.row(anchor[piece]) + (rest.row(v) - rest.row(anchor[piece])) *
+                                                          turn[static_cast<size_t>(piece)];
+  }
+}
+
+EditResult EditSession::State::result() const {
+  const Stopwatch watch;
+  EditResult result;
+  const MatrixField vertex_jacobians = operators().average * operators().jacobians_of(moved);
+  Points placed = moved;
+  place_loose_pieces(placed, vertex_jacobians);
+  result.vertices = editor->prepared_->mesh.scatter(placed, vertex_jacobians);
+  Eigen::Index row = 0;
+  for (const Handle& handle : editor->handles_) {
+    for (const int vertex : handle.vertices) {
+      result.vertices.row(vertex) = positions.row(row++);
+    }
+  }
+  result.report = report;
+  result.report.total_milliseconds += watch.milliseconds();
+  return result;
+}
+
+EditSession::EditSession(std::shared_ptr<const Editor> editor, const EditOptions& options)
+    : state_(std::make_unique<State>(std::move(editor), options)) {}
+EditSession::~EditSession() = default;
+EditSession::EditSession(EditSession&&) noexcept = default;
+
+void EditSession::aim(const std::vector<HandleTarget>& targets) { state_->aim(targets); }
+
+EditResult EditSession::advance(double milliseconds) {
+  if (!state_->aimed) {
+    throw Error(ErrorCode::bad_option, "The session has no targets yet. Call aim first.");
+  }
+  const Stopwatch watch;
+  while (!state_->settled() &&
+         (state_->next < state_->usable() || watch.milliseconds() < milliseconds)) {
+    state_->step();
+  }
+  return state_->result();
+}
+
+bool EditSession::settled() const { return state_->aimed && state_->settled(); }
+
+EditResult Editor::solve(const std::vector<HandleTarget>& targets, const EditOptions& options,
+                         ProgressRange progress) const {
+  // The editor is not owned: the session ends before it.
+  EditSession::State state({std::shared_ptr<void>(), this}, options);
+  state.aim(targets);
+  while (!state.settled()) {
+    progress.report(static_cast<double>(state.next) / state.step_count());
+    state.step();
+  }
+  progress.report(1.0);
+  return state.result();
+}
+
+}  // namespace supple
