@@ -72,7 +72,7 @@ def test_settled_is_what_bake_writes_and_then_nothing_is_done(bar, live, addon):
     settled = preview(bar)
     assert np.abs(settled - coarse).max() > 1e-5
     expected = addon("api").solve(bar).positions
-    assert np.abs(settled - expected).max() < 1e-2 * bodies.HEIGHT
+    assert np.abs(settled - expected).max() < 1e-5 * bodies.HEIGHT
     assert not live.step(12.0)
     update()
     assert np.array_equal(preview(bar), settled)

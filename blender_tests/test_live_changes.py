@@ -70,7 +70,7 @@ def test_settings_show_at_once(bar, live, addon, name, value):
     settle(live)
     assert np.abs(preview(bar) - before).max() > 1e-4
     expected = addon("api").solve(bar).positions
-    assert np.abs(preview(bar) - expected).max() < 1e-2 * bodies.HEIGHT
+    assert np.abs(preview(bar) - expected).max() < 1e-5 * bodies.HEIGHT
 
 
 def test_held_and_moved_while_live(bar, live):

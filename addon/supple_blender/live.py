@@ -19,6 +19,7 @@ BUSY_SECONDS, IDLE_SECONDS = 0.001, 0.03
 running = None
 ended = ""
 _busy = False
+_was_playing = False
 
 
 def is_live(obj):
@@ -60,8 +61,9 @@ def end(keep):
 
 def forget(message=""):
     """End Live without touching the file; return its Follower, or None."""
-    global running, ended
+    global running, ended, _was_playing
     follower, running = running, None
+    _was_playing = False
     if follower is None:
         return None
     ended = message
@@ -114,7 +116,22 @@ def _on_evaluated(scene, depsgraph=None):
         _guarded(motions.Place(scene, depsgraph), FRAME_MILLISECONDS, only_moved=True)
 
 
+def is_playing():
+    """Return whether an animation plays, or did when Esc was pressed: that ends it, not Live.
+
+    Blender ends the playback and then passes the same Esc on, before the timer's next turn.
+    """
+    return _was_playing or _plays()
+
+
+def _plays():
+    windows = bpy.context.window_manager.windows
+    return any(window.screen.is_animation_playing for window in windows)
+
+
 def _on_timer():
+    global _was_playing
+    _was_playing = _plays()
     shown = _shown()
     more = step(FRAME_MILLISECONDS)
     if _shown() != shown:

@@ -64,18 +64,13 @@ class SUPPLE_OT_live_cancel(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return live.running is not None and not _is_playing(context)
+        return live.running is not None and not live.is_playing()
 
     def execute(self, context):
         name = live.running.name
         live.end(keep=False)
         self.report({"INFO"}, f"{name}: as it was before Live")
         return {"FINISHED"}
-
-
-def _is_playing(context):
-    """Return whether Esc is to end the playback, not Live."""
-    return context.screen is not None and context.screen.is_animation_playing
 
 
 class SUPPLE_OT_distortion(HandleOperator, bpy.types.Operator):

@@ -111,7 +111,7 @@ def editor(rest, prepared_mesh, handles, model, stages, share):
     if found is None:
         progress = stages.begin("Binding handles", share)
         other = _editors.latest(lambda kept: (kept[0], kept[2]) == (rest.digest, model))
-        if hasattr(other, "rebind"):
+        if other is not None:
             found = other.rebind(handles, progress=progress)
         else:
             found = native.supple().Editor(prepared_mesh, handles, model=model, progress=progress)

@@ -11,9 +11,6 @@ import numpy as np
 SELECT_HEAD = (974, 535)
 LIVE = (897, 371)
 BAKE_WHILE_LIVE = (982, 290)
-SELECTION = (974, 473)
-PROPOSE = (974, 452)
-CLEAR = (1008, 555)
 DISTORTION = (881, 231)
 DISTORTION_ARROW = (864, 231)
 VIEW_IT = (930, 155)
@@ -195,30 +192,6 @@ def distort_and_bake(robot):
     say("Distortion was shown live, and Bake while live wrote the pose and ended it")
 
 
-def handles_of_a_selection(robot):
-    yield from fresh_bar(robot)
-    yield from robot.click(*CLEAR)
-    yield from robot.wait_for(lambda: len(bar().supple.handles) == 0, 3, "no handles")
-    yield from robot.move(*robot.middle_of_view())
-    yield from robot.press("TAB")
-    yield from robot.wait(0.5)
-    yield from robot.press("A")
-    yield from robot.wait(0.3)
-    yield from robot.click(*SELECTION)
-    yield from robot.wait_for(lambda: len(bar().supple.handles) == 1, 3, "a handle")
-    assert len(bodies.members(bar(), "Handle")) == len(bar().data.vertices)
-    yield from undo(robot)
-    assert bar().mode == "EDIT" and "Handle" not in bar().vertex_groups
-    yield from robot.press("TAB")
-    yield from robot.wait(0.5)
-    yield from robot.click(*PROPOSE)
-    yield from robot.wait_for(lambda: len(bar().supple.handles) == 12, 3, "twelve handles")
-    robot.screenshot("proposed.png")
-    yield from undo(robot)
-    assert len(bar().supple.handles) == 0 and len(bar().vertex_groups) == 3
-    say("+ Selection in Edit Mode and Propose 12 made handles; Ctrl+Z took exactly those back")
-
-
 PARTS = (
     follow_the_drag,
     take_back_a_drag,
@@ -227,5 +200,4 @@ PARTS = (
     escape_restores,
     undo_past_the_start,
     distort_and_bake,
-    handles_of_a_selection,
 )

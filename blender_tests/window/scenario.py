@@ -11,6 +11,7 @@ sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parent.parent)]
 
 import bodies  # noqa: E402
 import bpy  # noqa: E402
+import carrier_parts  # noqa: E402
 import install  # noqa: E402
 import live_parts  # noqa: E402
 import numpy as np  # noqa: E402
@@ -228,6 +229,7 @@ def scenario(robot):
         bake_in_edit_mode,
         handles_in_edit_mode,
         *live_parts.PARTS,
+        *carrier_parts.PARTS,
         cancel_long_work,
     ):
         yield from part(robot)
