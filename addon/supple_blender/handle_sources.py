@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from . import compat, groups, handles, live_solver, mesh_data, space
+from . import compat, groups, handles, mesh_data, native, space
 from .errors import UserError, count, some
 
 # Bones share the vertices at their joints; those that are a bone's alone are its handle, and the
@@ -54,7 +54,7 @@ def propose(context, obj, number):
     free[_free(obj, np.unique(rest.triangles))] = True
     candidates = np.flatnonzero(free)
     points = space.to_solve_points(rest.stretch, rest.positions)[candidates]
-    centres = candidates[live_solver.farthest_points(points, number)]
+    centres = candidates[native.supple().farthest_points(points, number)]
     if len(centres) < number:
         what = count(len(candidates), "vertex that is", "vertices that are")
         raise UserError(f"{obj.name}: it has {what} in no handle yet. Ask for fewer than {number}.")

@@ -88,7 +88,7 @@ def blend_weights(mesh, motions, blend):
     moved = [motion.vertices for motion in motions if motion.matrix is not None]
     if not moved:
         return blend.mask
-    weights = live_solver.falloff_weights(mesh, np.concatenate(moved), blend.falloff)
+    weights = native.supple().falloff_weights(mesh, np.concatenate(moved), blend.falloff)
     return weights if blend.mask is None else weights * blend.mask
 
 
@@ -97,7 +97,7 @@ def to_local(rest, vertices, strength, weights):
     vertices = np.asarray(vertices)
     if strength != 1.0 or weights is not None:
         at_rest = space.to_solve_points(rest.stretch, rest.positions)
-        vertices = live_solver.blend(at_rest, vertices, strength, weights)
+        vertices = native.supple().blend(at_rest, vertices, strength, weights)
     return space.to_local_points(rest.stretch, vertices)
 
 

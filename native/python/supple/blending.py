@@ -28,7 +28,7 @@ def blend(
 def falloff_weights(
     prepared: PreparedMesh, vertices: ArrayLike, radius: float
 ) -> NDArray[np.float64]:
-    """(n,) weights: 1 at `vertices`, falling smoothly to 0 at `radius` (the mesh's units) from them.
+    """(n,) weights: 1 at `vertices`, falling smoothly to 0 at `radius` from them (mesh units).
 
     Distances are along edges (Dijkstra), so up to some 15% more than along the surface; pieces
     without any of the vertices get 0.

@@ -144,7 +144,7 @@ class Editor:
             method: "supple", or "arap" for as-rigid-as-possible (spokes and rims).
             rounds: of closest rotations and Poisson solve; None for the default.
             network_rounds: how many of them, the last ones, use the network; None for the default.
-            polish: passes that let the network's stretch turn with the result; None for the default.
+            polish: passes that let the network's stretch turn with the result; None: the default.
             passes: the most towards least distortion at stiffness 1, and of "arap"; None for the
                 default.
             network: False replaces it by the identity.
