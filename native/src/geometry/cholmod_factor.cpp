@@ -96,16 +96,32 @@ class CholmodFactor : public Factor {
     view_.value_start = static_cast<const int*>(factor_->px);
     view_.rows = static_cast<const int*>(factor_->s);
     view_.values = static_cast<const double*>(factor_->x);
+    parts_ = supernode_parts(view_, static_cast<int>(factor_->n));
   }
   Eigen::Index entries() const override { return static_cast<Eigen::Index>(factor_->xsize); }
 
   RowMatrix<double> solve(const RowMatrix<double>& rhs, Substitution part) const override {
+    const Eigen::Index columns = rhs.cols();
+    const int threads = omp_in_parallel() ? 1 : omp_get_max_threads();
+    // Few columns share the tree, many are shared out.
+    return columns <= kPanelWidths[0] && !parts_.top_rows.empty()
+               ? solve_by_parts(rhs, part)
+               : solve_by_columns(rhs, part, panel_width(columns, threads));
+  }
+
+ private:
+  // Where row i of a right-hand side or solution is.
+  Eigen::Index place(Eigen::Index i, bool ordered) const {
+    return ordered ? i : static_cast<const int*>(factor_->Perm)[i];
+  }
+
+  RowMatrix<double> solve_by_columns(const RowMatrix<double>& rhs, Substitution part,
+                                     int width) const {
+    const Eigen::Index n = rhs.rows(), columns = rhs.cols();
     const bool ordered_in = part == Substitution::backward;
     const bool ordered_out = part == Substitution::forward;
-    const Eigen::Index n = rhs.rows(), columns = rhs.cols();
-    const int width = panel_width(columns, omp_in_parallel() ? 1 : omp_get_max_threads());
     const int panels = static_cast<int>((columns + width - 1) / width);
-    const int* const order = static_cast<const int*>(factor_->Perm);
+    const SupernodeRange all{0, view_.supernodes};
     RowMatrix<double> solution(n, columns);
     std::vector<AlignedArray> buffers;  // allocated here: nothing may be thrown in the loop
     for (int p = 0; p < std::min(panels, omp_get_max_threads()); ++p) {
@@ -119,23 +135,111 @@ class CholmodFactor : public Factor {
       const Eigen::Index count = std::min<Eigen::Index>(width, columns - first);
       for (Eigen::Index i = 0; i < n; ++i) {
         double* const to = panel + i * width;
-        const double* const from = rhs.data() + (ordered_in ? i : order[i]) * columns + first;
+        const double* const from = rhs.data() + place(i, ordered_in) * columns + first;
         std::copy(from, from + count, to);
         std::fill(to + count, to + width, 0.0);
       }
-      solve_panel(view_, panel, width, part);
+      if (part != Substitution::backward) {
+        forward_panel(view_, all, panel, width);
+      }
+      if (part != Substitution::forward) {
+        backward_panel(view_, all, panel, width);
+      }
       for (Eigen::Index i = 0; i < n; ++i) {
         const double* const from = panel + i * width;
-        std::copy(from, from + count,
-                  solution.data() + (ordered_out ? i : order[i]) * columns + first);
+        std::copy(from, from + count, solution.data() + place(i, ordered_out) * columns + first);
       }
     }
     return solution;
   }
 
- private:
+  // One panel; each part of the tree in a copy of its own, which other parts do not read. What the
+  // parts add to the top is summed in their order.
+  RowMatrix<double> solve_by_parts(const RowMatrix<double>& rhs, Substitution part) const {
+    constexpr int kWidth = kPanelWidths[0], kParts = SupernodeParts::kParts;
+    const Eigen::Index n = rhs.rows(), columns = rhs.cols();
+    const bool ordered_in = part == Substitution::backward;
+    const bool ordered_out = part == Substitution::forward;
+    const size_t size = static_cast<size_t>(n) * kWidth;
+    RowMatrix<double> solution(n, columns);
+    std::vector<AlignedArray> panels;
+    for (int p = 0; p <= kParts; ++p) {
+      panels.push_back(aligned_array(size));
+    }
+    double* const top = panels.back().get();
+    const auto row_in = [&](Eigen::Index i, double* panel) {
+      const double* const from = rhs.data() + place(i, ordered_in) * columns;
+      std::copy(from, from + columns, panel + i * kWidth);
+      std::fill(panel + i * kWidth + columns, panel + (i + 1) * kWidth, 0.0);
+    };
+    const auto row_out = [&](Eigen::Index i, const double* panel) {
+      const double* const from = panel + i * kWidth;
+      std::copy(from, from + columns, solution.data() + place(i, ordered_out) * columns);
+    };
+    const auto for_rows = [&](int p, const auto& visit) {
+      for (const SupernodeRange& range : parts_.parts[p]) {
+        for (Eigen::Index i = view_.super[range.first]; i < view_.super[range.last]; ++i) {
+          visit(i);
+        }
+      }
+    };
+#pragma omp parallel for schedule(static)
+    for (int p = 0; p < kParts; ++p) {
+      double* const panel = panels[static_cast<size_t>(p)].get();
+      for (const int i : parts_.top_rows) {
+        std::fill(panel + static_cast<size_t>(i) * kWidth,
+                  panel + static_cast<size_t>(i + 1) * kWidth, 0.0);
+      }
+      for_rows(p, [&](Eigen::Index i) { row_in(i, panel); });
+      if (part != Substitution::backward) {
+        for (const SupernodeRange& range : parts_.parts[p]) {
+          forward_panel(view_, range, panel, kWidth);
+        }
+      }
+    }
+    for (const int i : parts_.top_rows) {
+      row_in(i, top);
+      for (int p = 0; p < kParts; ++p) {
+        for (int c = 0; c < kWidth; ++c) {
+          const size_t at = static_cast<size_t>(i) * kWidth + static_cast<size_t>(c);
+          top[at] += panels[static_cast<size_t>(p)][at];
+        }
+      }
+    }
+    if (part != Substitution::backward) {
+      for (const SupernodeRange& range : parts_.top) {
+        forward_panel(view_, range, top, kWidth);
+      }
+    }
+    if (part != Substitution::forward) {
+      for (auto range = parts_.top.rbegin(); range != parts_.top.rend(); ++range) {
+        backward_panel(view_, *range, top, kWidth);
+      }
+    }
+    for (const int i : parts_.top_rows) {
+      row_out(i, top);
+    }
+#pragma omp parallel for schedule(static)
+    for (int p = 0; p < kParts; ++p) {
+      double* const panel = panels[static_cast<size_t>(p)].get();
+      if (part != Substitution::forward) {
+        for (const int i : parts_.top_rows) {
+          std::copy(top + static_cast<size_t>(i) * kWidth,
+                    top + static_cast<size_t>(i + 1) * kWidth,
+                    panel + static_cast<size_t>(i) * kWidth);
+        }
+        for (auto range = parts_.parts[p].rbegin(); range != parts_.parts[p].rend(); ++range) {
+          backward_panel(view_, *range, panel, kWidth);
+        }
+      }
+      for_rows(p, [&](Eigen::Index i) { row_out(i, panel); });
+    }
+    return solution;
+  }
+
   FactorPointer factor_;
   SupernodalFactor view_;
+  SupernodeParts parts_;
 };
 
 }  // namespace

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "supernodal_solve.h"
 
+#include <algorithm>
+#include <iterator>
+
 #include "supple/core/simd.h"
 
 namespace supple {
@@ -36,10 +39,10 @@ struct Row {
 };
 
 template <int Width, int Bytes>
-SUPPLE_INLINE void forward(const SupernodalFactor& factor, double* panel) {
+SUPPLE_INLINE void forward(const SupernodalFactor& factor, SupernodeRange range, double* panel) {
   using R = Row<Width, Bytes>;
   R* const x = reinterpret_cast<R*>(panel);
-  for (int s = 0; s < factor.supernodes; ++s) {
+  for (int s = range.first; s < range.last; ++s) {
     const int first = factor.super[s], columns = factor.super[s + 1] - first;
     const int* const rows = factor.rows + factor.row_start[s];
     const int height = factor.row_start[s + 1] - factor.row_start[s];
@@ -81,10 +84,10 @@ SUPPLE_INLINE void forward(const SupernodalFactor& factor, double* panel) {
 }
 
 template <int Width, int Bytes>
-SUPPLE_INLINE void backward(const SupernodalFactor& factor, double* panel) {
+SUPPLE_INLINE void backward(const SupernodalFactor& factor, SupernodeRange range, double* panel) {
   using R = Row<Width, Bytes>;
   R* const x = reinterpret_cast<R*>(panel);
-  for (int s = factor.supernodes - 1; s >= 0; --s) {
+  for (int s = range.last - 1; s >= range.first; --s) {
     const int first = factor.super[s], columns = factor.super[s + 1] - first;
     const int* const rows = factor.rows + factor.row_start[s];
     const int height = factor.row_start[s + 1] - factor.row_start[s];
@@ -126,45 +129,132 @@ SUPPLE_INLINE void backward(const SupernodalFactor& factor, double* panel) {
   }
 }
 
-template <int Width, int Bytes>
-SUPPLE_INLINE void solve(const SupernodalFactor& factor, double* panel, Substitution part) {
-  if (part != Substitution::backward) {
-    forward<Width, Bytes>(factor, panel);
-  }
-  if (part != Substitution::forward) {
-    backward<Width, Bytes>(factor, panel);
-  }
-}
-
 template <int Width>
 struct Kernels {
-  SUPPLE_AVX512 static void avx512(const SupernodalFactor& factor, double* panel,
-                                   Substitution part) {
-    solve<Width, (Width < 8 ? 32 : 64)>(factor, panel, part);
+  using Function = void (*)(const SupernodalFactor&, SupernodeRange, double*);
+  static constexpr int kWidest = Width < 8 ? 32 : 64;
+  SUPPLE_AVX512 static void forward_avx512(const SupernodalFactor& factor, SupernodeRange range,
+                                           double* panel) {
+    forward<Width, kWidest>(factor, range, panel);
   }
-  SUPPLE_AVX2 static void avx2(const SupernodalFactor& factor, double* panel, Substitution part) {
-    solve<Width, 32>(factor, panel, part);
+  SUPPLE_AVX2 static void forward_avx2(const SupernodalFactor& factor, SupernodeRange range,
+                                       double* panel) {
+    forward<Width, 32>(factor, range, panel);
   }
-  static void plain(const SupernodalFactor& factor, double* panel, Substitution part) {
-    solve<Width, 16>(factor, panel, part);
+  static void forward_plain(const SupernodalFactor& factor, SupernodeRange range, double* panel) {
+    forward<Width, 16>(factor, range, panel);
   }
-  static void best(const SupernodalFactor& factor, double* panel, Substitution part) {
-    static const auto kernel = best_kernel(&avx512, &avx2, &plain);
-    kernel(factor, panel, part);
+  SUPPLE_AVX512 static void backward_avx512(const SupernodalFactor& factor, SupernodeRange range,
+                                            double* panel) {
+    backward<Width, kWidest>(factor, range, panel);
+  }
+  SUPPLE_AVX2 static void backward_avx2(const SupernodalFactor& factor, SupernodeRange range,
+                                        double* panel) {
+    backward<Width, 32>(factor, range, panel);
+  }
+  static void backward_plain(const SupernodalFactor& factor, SupernodeRange range, double* panel) {
+    backward<Width, 16>(factor, range, panel);
+  }
+  static Function best_forward() {
+    static const Function kernel =
+        best_kernel<Function>(&forward_avx512, &forward_avx2, &forward_plain);
+    return kernel;
+  }
+  static Function best_backward() {
+    static const Function kernel =
+        best_kernel<Function>(&backward_avx512, &backward_avx2, &backward_plain);
+    return kernel;
   }
 };
 
 }  // namespace
 
-void solve_panel(const SupernodalFactor& factor, double* panel, int width, Substitution part) {
-  switch (width) {
-    case 4:
-      return Kernels<4>::best(factor, panel, part);
-    case 8:
-      return Kernels<8>::best(factor, panel, part);
-    default:
-      return Kernels<16>::best(factor, panel, part);
+void forward_panel(const SupernodalFactor& factor, SupernodeRange range, double* panel, int width) {
+  const auto kernel = width == 4   ? Kernels<4>::best_forward()
+                      : width == 8 ? Kernels<8>::best_forward()
+                                   : Kernels<16>::best_forward();
+  kernel(factor, range, panel);
+}
+
+void backward_panel(const SupernodalFactor& factor, SupernodeRange range, double* panel,
+                    int width) {
+  const auto kernel = width == 4   ? Kernels<4>::best_backward()
+                      : width == 8 ? Kernels<8>::best_backward()
+                                   : Kernels<16>::best_backward();
+  kernel(factor, range, panel);
+}
+
+SupernodeParts supernode_parts(const SupernodalFactor& factor, int rows) {
+  // Below so many entries a solve takes less time than it takes to wake a thread.
+  constexpr double kSmall = 100'000.0;
+  // A subtree goes to one part; with all of them below this share the parts come out even.
+  constexpr double kLargest = 0.12;
+  const int count = factor.supernodes;
+  std::vector<int> owner(static_cast<size_t>(rows));  // supernode of each row
+  for (int s = 0; s < count; ++s) {
+    for (int r = factor.super[s]; r < factor.super[s + 1]; ++r) {
+      owner[static_cast<size_t>(r)] = s;
+    }
   }
+  // Supernodes are in postorder: a subtree is the range from its first descendant to its root.
+  std::vector<int> parent(static_cast<size_t>(count), -1), first(static_cast<size_t>(count));
+  std::vector<double> work(static_cast<size_t>(count));
+  for (int s = 0; s < count; ++s) {
+    first[static_cast<size_t>(s)] = s;
+  }
+  double total = 0.0;
+  for (int s = 0; s < count; ++s) {
+    const auto here = static_cast<size_t>(s);
+    const int columns = factor.super[s + 1] - factor.super[s];
+    const int height = factor.row_start[s + 1] - factor.row_start[s];
+    const double own = static_cast<double>(columns) * height;
+    work[here] += own;
+    total += own;
+    if (height > columns) {
+      const int up = owner[static_cast<size_t>(factor.rows[factor.row_start[s] + columns])];
+      parent[here] = up;
+      work[static_cast<size_t>(up)] += work[here];
+      first[static_cast<size_t>(up)] = std::min(first[static_cast<size_t>(up)], first[here]);
+    }
+  }
+  SupernodeParts result;
+  if (total < kSmall) {
+    result.top.push_back({0, count});
+    return result;
+  }
+  std::vector<int> subtrees;
+  for (int s = count - 1; s >= 0; --s) {
+    const auto here = static_cast<size_t>(s);
+    const bool light = work[here] <= kLargest * total;
+    const bool under_top =
+        parent[here] < 0 || work[static_cast<size_t>(parent[here])] > kLargest * total;
+    if (!light) {
+      result.top.push_back({s, s + 1});
+    } else if (under_top) {
+      subtrees.push_back(s);
+    }
+  }
+  std::reverse(result.top.begin(), result.top.end());
+  for (const SupernodeRange& range : result.top) {
+    for (int r = factor.super[range.first]; r < factor.super[range.last]; ++r) {
+      result.top_rows.push_back(r);
+    }
+  }
+  // The heaviest first, each to the part that has least.
+  std::stable_sort(subtrees.begin(), subtrees.end(), [&](int a, int b) {
+    return work[static_cast<size_t>(a)] > work[static_cast<size_t>(b)];
+  });
+  double load[SupernodeParts::kParts] = {};
+  for (const int s : subtrees) {
+    const auto least = std::min_element(std::begin(load), std::end(load)) - std::begin(load);
+    load[least] += work[static_cast<size_t>(s)];
+    result.parts[least].push_back({first[static_cast<size_t>(s)], s + 1});
+  }
+  for (auto& part : result.parts) {
+    std::sort(part.begin(), part.end(),
+              [](const SupernodeRange& a, const SupernodeRange& b) { return a.first < b.first; });
+  }
+  return result;
 }
 
 }  // namespace supple

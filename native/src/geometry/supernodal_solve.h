@@ -3,8 +3,7 @@
 #pragma once
 
 #include <cstddef>
-
-#include "factor.h"
+#include <vector>
 
 namespace supple {
 
@@ -23,9 +22,26 @@ struct SupernodalFactor {
 /// Panels as wide as this many right-hand sides are solved for: 4, 8, 16.
 constexpr int kPanelWidths[] = {4, 8, 16};
 
-/// Solves L L^T X = B in place, or L X = B or L^T X = B alone. panel: n x width, row-major, aligned
-/// to 64 bytes, in the factor's order; width: one of kPanelWidths. Each entry of L is read twice,
-/// for 2 * width products each: one column at a time, the reading alone would take longer.
-void solve_panel(const SupernodalFactor& factor, double* panel, int width, Substitution part);
+/// Some supernodes [first, last).
+struct SupernodeRange {
+  int first, last;
+};
+
+/// Forward substitution L X = B over some supernodes, ascending. panel: n x width, row-major,
+/// aligned to 64 bytes, in the factor's order; width: one of kPanelWidths. Each entry of L is read
+/// once for all columns: one column at a time, the reading alone would take longer.
+void forward_panel(const SupernodalFactor& factor, SupernodeRange range, double* panel, int width);
+/// Back substitution L^T X = B in the same way, descending.
+void backward_panel(const SupernodalFactor& factor, SupernodeRange range, double* panel, int width);
+
+/// The elimination tree cut into parts that do not touch each other and a top that all of them lead
+/// to. Made once a factor, the same for any number of threads.
+struct SupernodeParts {
+  static constexpr int kParts = 4;
+  std::vector<SupernodeRange> parts[kParts];  ///< subtrees, ascending; all empty for a small factor
+  std::vector<SupernodeRange> top;            ///< ascending
+  std::vector<int> top_rows;                  ///< rows of the top's supernodes, ascending
+};
+SupernodeParts supernode_parts(const SupernodalFactor& factor, int rows);
 
 }  // namespace supple

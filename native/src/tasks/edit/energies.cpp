@@ -15,7 +15,7 @@ namespace {
 // Below this part of its area a face's distortion goes on along its tangent.
 constexpr double kSmallest = 0.1;
 // A fold's faces resist bending this many times more, each time it is found.
-constexpr double kStiffer = 4.0;
+constexpr double kStiffer = 5.0;
 
 Matrix3 tangential(const SurfaceOperators& operators, const Points& moved, Eigen::Index f) {
   const auto inverse = matrix_at(operators.inverse_frames, f);
@@ -117,21 +117,23 @@ double StiffEnergy::evaluate(const Points& moved, Points& gradient) const {
 Eigen::VectorXi StiffEnergy::turned_over(const Points& points) const {
   const Points normals = face_normals(points, operators_.faces);
   const CornerTable& corners = operators_.corners;
-  Points around(points.rows(), 3);
-#pragma omp parallel for schedule(static)
-  for (Eigen::Index v = 0; v < around.rows(); ++v) {
-    around.row(v).setZero();
-    for (int i = corners.first[v]; i < corners.first[v + 1]; ++i) {
-      around.row(v) += normals.row(corners.corner[i] / 3);
-    }
-  }
   Eigen::VectorXi result(normals.rows());
 #pragma omp parallel for schedule(static)
   for (Eigen::Index f = 0; f < result.size(); ++f) {
-    const Eigen::RowVector3d others = around.row(operators_.faces(f, 0)) +
-                                      around.row(operators_.faces(f, 1)) +
-                                      around.row(operators_.faces(f, 2)) - 3.0 * normals.row(f);
-    result[f] = normals.row(f).dot(others) < 0.0 ? 1 : 0;
+    const auto face = operators_.faces.row(f);
+    Eigen::RowVector3d around = Eigen::RowVector3d::Zero();
+    for (int c = 0; c < 3; ++c) {
+      // The faces across the edge from this corner to the next: met at this corner only.
+      const int from = face[c], to = face[(c + 1) % 3];
+      for (int i = corners.first[from]; i < corners.first[from + 1]; ++i) {
+        const int other = corners.corner[i] / 3;
+        const auto its = operators_.faces.row(other);
+        if (other != f && (its[0] == to || its[1] == to || its[2] == to)) {
+          around += normals.row(other);
+        }
+      }
+    }
+    result[f] = normals.row(f).dot(around) < 0.0 ? 1 : 0;
   }
   return result;
 }

@@ -13,8 +13,8 @@ namespace supple {
 namespace {
 
 // Passes between two looks for folds, and how often they are stiffened at most.
-constexpr int kFoldInterval = 15;
-constexpr int kMostStiffenings = 8;
+constexpr int kFoldInterval = 8;
+constexpr int kMostStiffenings = 10;
 
 class Stopwatch {
  public:
@@ -308,9 +308,6 @@ void EditSession::State::place_loose_pieces(Points& placed,
                                             const MatrixField& vertex_jacobians) const {
   const Points& rest = operators().vertices;
   const Eigen::VectorXi& anchor = editor->anchor_;
-  if ((anchor.array() < 0).all()) {
-    return;
-  }
   std::vector<Matrix3> turn(static_cast<size_t>(anchor.size()), Matrix3::Identity());
   if (options.loose_pieces == LoosePieces::follow) {
     for (Eigen::Index c = 0; c < anchor.size(); ++c) {
@@ -334,10 +331,14 @@ void EditSession::State::place_loose_pieces(Points& placed,
 EditResult EditSession::State::result() const {
   const Stopwatch watch;
   EditResult result;
-  const MatrixField vertex_jacobians = operators().average * operators().jacobians_of(moved);
+  const TriangleMesh& mesh = editor->prepared_->mesh;
   Points placed = moved;
-  place_loose_pieces(placed, vertex_jacobians);
-  result.vertices = editor->prepared_->mesh.scatter(placed, vertex_jacobians);
+  MatrixField vertex_jacobians(0, 9);
+  if ((editor->anchor_.array() >= 0).any() || mesh.vertices().rows() != moved.rows()) {
+    vertex_jacobians = operators().average * operators().jacobians_of(moved);
+    place_loose_pieces(placed, vertex_jacobians);
+  }
+  result.vertices = mesh.scatter(placed, vertex_jacobians);
   Eigen::Index row = 0;
   for (const Handle& handle : editor->handles_) {
     for (const int vertex : handle.vertices) {
