@@ -43,7 +43,7 @@ class StiffEnergy : public DeformationEnergy {
   int stiffen_folds(const Points& moved);
 
  private:
-  static constexpr double kBending = 0.22;
+  static constexpr double kBending = 0.25;
   Eigen::VectorXi turned_over(const Points& points) const;
 
   const SurfaceOperators& operators_;
