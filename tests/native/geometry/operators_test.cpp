@@ -81,6 +81,12 @@ TEST_P(OperatorsZoo, PoissonsRightHandSideIsTheLaplacianOfTheMap) {
   EXPECT_LT((got - expected).cwiseAbs().maxCoeff(), 1e-11 * largest());
 }
 
+TEST_P(OperatorsZoo, DivergenceOfAFieldIsTheSparseOperatorTimesIt) {
+  const MatrixField field = test::noise(operators.faces.rows(), 9, 3);
+  const Points expected = operators.divergence * stacked(field);
+  EXPECT_LT((operators.divergence_of(field) - expected).norm(), 1e-14 * expected.norm());
+}
+
 TEST_P(OperatorsZoo, DivergenceBackwardIsItsTranspose) {
   MatrixField x(operators.faces.rows(), 9);
   x = test::noise(x.rows(), 9, 1);
