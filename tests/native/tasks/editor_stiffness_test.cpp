@@ -76,12 +76,12 @@ TEST_F(Stiffness, PassesEndWhereTheyHaveConverged) {
 }
 
 TEST_F(Stiffness, TheSliderHasNoJumps) {
-  // One more pass at most and a hundredth of the stretch between neighbours.
+  // Between neighbours at most two passes more, the first of which go farthest.
   const double size = test::diagonal(mesh.vertices);
   Points before = editor->solve(edit.targets).vertices;
   for (double stiffness = 0.02; stiffness < 0.3; stiffness += 0.02) {
     const Points now = editor->solve(edit.targets, {.stiffness = stiffness}).vertices;
-    EXPECT_LT(test::farthest(now, before), 0.05 * size) << stiffness;
+    EXPECT_LT(test::farthest(now, before), 0.1 * size) << stiffness;
     before = now;
   }
 }
