@@ -84,7 +84,9 @@ TEST_P(OperatorsZoo, PoissonsRightHandSideIsTheLaplacianOfTheMap) {
 TEST_P(OperatorsZoo, DivergenceOfAFieldIsTheSparseOperatorTimesIt) {
   const MatrixField field = test::noise(operators.faces.rows(), 9, 3);
   const Points expected = operators.divergence * stacked(field);
-  EXPECT_LT((operators.divergence_of(field) - expected).norm(), 1e-14 * expected.norm());
+  // Relative to what cancels in the sums; slivers' gradients, found in two ways, lose a digit.
+  const double size = (operators.divergence.cwiseAbs() * stacked(field).cwiseAbs()).norm();
+  EXPECT_LT((operators.divergence_of(field) - expected).norm(), 1e-13 * size);
 }
 
 TEST_P(OperatorsZoo, DivergenceBackwardIsItsTranspose) {

@@ -89,7 +89,7 @@ TEST_P(BiharmonicZoo, AFormerOneChangesNothing) {
   EXPECT_LT(
       (BiharmonicInterpolation(base, turned, &fresh).solve(values.colwise().reverse()) - expected)
           .norm(),
-      tolerance);
+      10.0 * tolerance);  // their system is eliminated in another order
   const RowMatrix<double> few = test::noise(fewer.size(), 3, 6);
   const RowMatrix<double> few_expected = former.solve(few);
   EXPECT_LT((BiharmonicInterpolation(base, fewer, &fresh).solve(few) - few_expected).norm(),
