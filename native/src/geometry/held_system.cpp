@@ -157,6 +157,9 @@ std::optional<HeldSystem> HeldSystem::changed(const Eigen::VectorXi& held) const
     }
   }
   changes->small.compute(small);
+  if (added + freed > 0 && !(changes->small.rcond() > 1e-14)) {
+    return std::nullopt;
+  }
   HeldSystem result;
   result.factored_ = factored_;
   result.held_ = held;

@@ -133,7 +133,7 @@ SUPPLE_INLINE void newton(const double* from, double* to, Eigen::Index count) {
   using V = typename Lanes<double, Bytes>::type;
   constexpr int kLanes = Lanes<double, Bytes>::count;
   constexpr int kSteps = 9;
-  V q[9], cofactor[9], change{}, square{};
+  V q[9], cofactor[9], change{}, square{}, start{};
   for (int e = 0; e < 9; ++e) {
     for (int l = 0; l < kLanes; ++l) {
       q[e][l] = l < count ? from[9 * l + e] : (e % 4 == 0 ? 1.0 : 0.0);
@@ -155,6 +155,7 @@ SUPPLE_INLINE void newton(const double* from, double* to, Eigen::Index count) {
     cofactors(q, cofactor);
     const V determinant = q[0] * cofactor[0] + q[1] * cofactor[1] + q[2] * cofactor[2];
     const V half_inverse = 0.5 / determinant;
+    start = step == 0 ? determinant : start;
     change = V{};
     for (int e = 0; e < 9; ++e) {
       const V next = 0.5 * q[e] + half_inverse * cofactor[e];
@@ -173,7 +174,8 @@ SUPPLE_INLINE void newton(const double* from, double* to, Eigen::Index count) {
   cofactors(q, cofactor);
   const V determinant = q[0] * cofactor[0] + q[1] * cofactor[1] + q[2] * cofactor[2];
   for (int l = 0; l < kLanes && l < count; ++l) {
-    const bool good = change[l] < 1e-20 && determinant[l] > 0.5;
+    // Of what began nearly singular, rounding would have chosen the rotation.
+    const bool good = change[l] < 1e-20 && start[l] > 1e-6 && determinant[l] > 0.5;
     for (int e = 0; e < 9; ++e) {
       to[9 * l + e] = good ? q[e][l] : std::numeric_limits<double>::quiet_NaN();
     }

@@ -35,7 +35,7 @@ class EigenFactor : public Factor {
   }
   RowMatrix<double> solve(const RowMatrix<double>& rhs, Substitution part) const override {
     Eigen::MatrixXd x = rhs;
-    const auto root = factor_.vectorD().cwiseSqrt();
+    const Eigen::VectorXd root = factor_.vectorD().cwiseSqrt();
     if (part != Substitution::backward) {
       x = place_.inverse() * x;
       factor_.matrixL().solveInPlace(x);

@@ -92,15 +92,6 @@ TEST(ClosestRotation, TurnsWithItsMatrix) {
             1e-13);
 }
 
-TEST(ClosestRotation, OfAFieldIsRowByRow) {
-  MatrixField field(40, 9);
-  field = test::noise(40, 9, 1);
-  const MatrixField rotations = closest_rotations(field);
-  for (Eigen::Index f = 0; f < field.rows(); ++f) {
-    EXPECT_EQ(Matrix3(matrix_at(rotations, f)), closest_rotation(matrix_at(field, f)));
-  }
-}
-
 TEST(PolarDecomposition, StretchIsSymmetricAndTheProductIsTheMatrix) {
   for (uint64_t seed = 0; seed < 200; ++seed) {
     const Matrix3 j = test::noise(3, 3, seed);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "supple/geometry/sparse_cholesky.h"
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <string>
 #include <thread>
@@ -120,6 +122,48 @@ TEST_P(Cholesky, SeveralThreadsSolveTheSame) {
   for (const auto& result : results) {
     EXPECT_EQ(result, expected);
   }
+}
+
+TEST_P(Cholesky, BackwardOfForwardSolves) {
+  for (const zoo::Entry& entry : zoo::all()) {
+    const SparseMatrix matrix = definite(entry.mesh);
+    const SparseCholesky factor(matrix, GetParam());
+    for (const Eigen::Index columns : {1, 3, 17}) {
+      const RowMatrix<double> rhs = test::noise(matrix.rows(), columns, 4);
+      const RowMatrix<double> expected = factor.solve(rhs);
+      EXPECT_LT((factor.backward(factor.forward(rhs)) - expected).norm(), 1e-13 * expected.norm())
+          << entry.name << ", " << columns << " columns";
+    }
+  }
+}
+
+TEST_P(Cholesky, ForwardOfUnitVectorsHasTheInversesInnerProducts) {
+  // With A = P^T L L^T P the columns L^-1 P e_i have the inner products of A^-1.
+  for (const zoo::Entry& entry : zoo::all()) {
+    const SparseMatrix matrix = definite(entry.mesh);
+    const SparseCholesky factor(matrix, GetParam());
+    const Eigen::Index n = matrix.rows(), count = std::min<Eigen::Index>(n, 12);
+    RowMatrix<double> units = RowMatrix<double>::Zero(n, count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      units(i * n / count, i) = 1.0;
+    }
+    const RowMatrix<double> half = factor.forward(units);
+    const RowMatrix<double> expected = units.transpose() * factor.solve(units);
+    EXPECT_LT((half.transpose() * half - expected).norm(), 1e-12 * expected.norm()) << entry.name;
+  }
+}
+
+TEST_P(Cholesky, HalvesAreInTheFactorsOrder) {
+  // Of a diagonal matrix a half is the root of its entry, moved to the row's place in the factor.
+  const Eigen::VectorXd diagonal = Eigen::VectorXd::LinSpaced(9, 1.0, 9.0);
+  Eigen::MatrixXd dense = diagonal.asDiagonal();
+  const SparseCholesky factor(sparse(dense), GetParam());
+  const Eigen::VectorXi& order = factor.symbolic().ordering();
+  const RowMatrix<double> half = factor.forward(RowMatrix<double>::Identity(9, 9));
+  for (int place = 0; place < 9; ++place) {
+    EXPECT_NEAR(half(place, order[place]), 1.0 / std::sqrt(diagonal[order[place]]), 1e-15);
+  }
+  EXPECT_NEAR(half.squaredNorm(), diagonal.cwiseInverse().sum(), 1e-13);
 }
 
 INSTANTIATE_TEST_SUITE_P(Backends, Cholesky, ::testing::Values(Backend::cholmod, Backend::eigen),

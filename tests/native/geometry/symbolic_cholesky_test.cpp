@@ -321,11 +321,17 @@ void expect_panels_solve() {
         Eigen::Map<RowMatrix<double>> x(panel, n, width);
         const RowMatrix<double> known = test::noise(n, width, 7);
         x = layout.dense * (layout.dense.transpose() * known);
-        solve_panel(layout.view(), panel, width);
+        solve_panel(layout.view(), panel, width, Substitution::both);
         const double condition =
             std::pow(layout.dense.norm(), 2) * std::pow(layout.dense.inverse().norm(), 2);
         EXPECT_LT((x - known).norm(), 1e-15 * condition * known.norm())
             << widths.size() << " supernodes, every " << step << " row, width " << width;
+        x = layout.dense * known;
+        solve_panel(layout.view(), panel, width, Substitution::forward);
+        EXPECT_LT((x - known).norm(), 1e-15 * condition * known.norm()) << "forward";
+        x = layout.dense.transpose() * known;
+        solve_panel(layout.view(), panel, width, Substitution::backward);
+        EXPECT_LT((x - known).norm(), 1e-15 * condition * known.norm()) << "backward";
       }
     }
   }

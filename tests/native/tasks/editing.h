@@ -51,6 +51,18 @@ inline std::shared_ptr<const LocalJacobianNetwork<float>> editing_network(
       rest.context, signal, strength));
 }
 
+/// Every way to edit: both ends of the slider, what lies between them, and ARAP.
+struct Kind {
+  std::string name;
+  EditOptions options;
+};
+inline std::vector<Kind> kinds(int passes = EditOptions().passes) {
+  return {{"natural", {.passes = passes}},
+          {"half stiff", {.stiffness = 0.5, .passes = passes}},
+          {"stiff", {.stiffness = 1.0, .passes = passes}},
+          {"arap", {.method = EditMethod::arap, .passes = passes}}};
+}
+
 /// One handle holds, one turns and moves: an edit that bends.
 struct Edit {
   std::vector<Handle> handles;

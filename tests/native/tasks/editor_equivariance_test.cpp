@@ -13,8 +13,7 @@ class EditEquivariance : public ::testing::TestWithParam<zoo::Entry> {
     const zoo::Mesh& mesh = GetParam().mesh;
     const test::Edit edit = test::bending(mesh.vertices, mesh.vertices.rows() < 12 ? 2 : 6);
     const double size = test::diagonal(mesh.vertices);
-    for (const EditMode mode : {EditMode::natural, EditMode::stiff}) {
-      const EditOptions options{.mode = mode, .passes = 5};
+    for (const auto& [name, options] : test::kinds(5)) {
       const Points expected = Editor(test::prepared(mesh, 64), edit.handles, network)
                                   .solve(edit.targets, options)
                                   .vertices;
@@ -31,8 +30,7 @@ class EditEquivariance : public ::testing::TestWithParam<zoo::Entry> {
         const auto turned = test::prepared({mesh.vertices * r1, mesh.faces}, 64);
         const Points got = Editor(turned, edit.handles, network).solve(targets, options).vertices;
         const Points wanted = (expected * r2).rowwise() + shift;
-        EXPECT_LT(test::farthest(got, wanted), tolerance * size)
-            << (mode == EditMode::natural ? "natural" : "stiff") << ", rotation " << which;
+        EXPECT_LT(test::farthest(got, wanted), tolerance * size) << name << ", rotation " << which;
       }
     }
   }

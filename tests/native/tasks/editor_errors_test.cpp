@@ -118,10 +118,21 @@ TEST_F(EditorErrors, APositionThatIsNotFinite) {
 }
 
 TEST_F(EditorErrors, NegativeRoundsOrPasses) {
-  options.rounds = -1;
-  EXPECT_TRUE(solving_fails(ErrorCode::bad_option, {"Rounds"}));
-  options = {.passes = -1};
-  EXPECT_TRUE(solving_fails(ErrorCode::bad_option, {"passes"}));
+  for (const EditOptions& bad : {EditOptions{.rounds = -1}, EditOptions{.network_rounds = -1},
+                                 EditOptions{.polish = -1}, EditOptions{.passes = -1}}) {
+    options = bad;
+    EXPECT_TRUE(solving_fails(ErrorCode::bad_option, {"Rounds", "passes"}));
+  }
+}
+
+TEST_F(EditorErrors, AStiffnessOutOfRange) {
+  for (const double bad : {-1e-9, 1.0 + 1e-9, std::numeric_limits<double>::quiet_NaN()}) {
+    options.stiffness = bad;
+    EXPECT_TRUE(solving_fails(ErrorCode::bad_option, {"stiffness", "0 (natural)", "1 (stiff)"}));
+    const auto editor = std::make_shared<const Editor>(mesh_, handles, nullptr);
+    EXPECT_TRUE(test::fails_with(ErrorCode::bad_option, {"stiffness"},
+                                 [&] { EditSession(editor, options); }));
+  }
 }
 
 TEST_F(EditorErrors, CancelledBeforeAndWhileSolving) {
@@ -129,7 +140,7 @@ TEST_F(EditorErrors, CancelledBeforeAndWhileSolving) {
   Progress progress;
   progress.cancel();
   EXPECT_TRUE(test::fails_with(ErrorCode::cancelled, {}, [&] {
-    editor.solve(targets, {.mode = EditMode::stiff}, ProgressRange(&progress));
+    editor.solve(targets, {.stiffness = 1.0}, ProgressRange(&progress));
   }));
   EXPECT_TRUE(test::fails_with(ErrorCode::cancelled, {},
                                [&] { Editor(mesh_, handles, nullptr, ProgressRange(&progress)); }));
@@ -144,10 +155,11 @@ TEST_F(EditorErrors, AnEditorWorksOnAfterAFailedSolve) {
   EXPECT_EQ(editor.solve(targets).vertices, before);
 }
 
-TEST(EditModes, AreFoundByName) {
-  EXPECT_EQ(edit_mode("natural"), EditMode::natural);
-  EXPECT_EQ(edit_mode("stiff"), EditMode::stiff);
-  EXPECT_TRUE(test::fails_with(ErrorCode::bad_option, {"'soft'"}, [] { edit_mode("soft"); }));
+TEST(EditMethods, AreFoundByName) {
+  EXPECT_EQ(edit_method("supple"), EditMethod::supple);
+  EXPECT_EQ(edit_method("arap"), EditMethod::arap);
+  EXPECT_TRUE(test::fails_with(ErrorCode::bad_option, {"'soft'", "'supple'", "'arap'"},
+                               [] { edit_method("soft"); }));
 }
 
 TEST(PreparedMeshErrors, OptionsOutOfRange) {

@@ -36,14 +36,13 @@ class RigidZoo : public ::testing::TestWithParam<zoo::Entry> {
     const Editor editor(prepared, handles(prepared->mesh, pieces),
                         with_network ? test::editing_network() : nullptr);
     const double size = test::diagonal(mesh.vertices);
-    for (const EditMode mode : {EditMode::natural, EditMode::stiff}) {
+    for (const auto& [name, options] : test::kinds(5)) {
       const Matrix3 turn = test::rotation(3);
       const Eigen::RowVector3d offset = size * Eigen::RowVector3d(0.4, -0.9, 0.2);
       const HandleTarget target{.matrix = test::affine(turn, offset), .positions = {}};
-      const Points got = editor.solve({target, target}, {.mode = mode, .passes = 5}).vertices;
+      const Points got = editor.solve({target, target}, options).vertices;
       const Points expected = (mesh.vertices * turn).rowwise() + offset;
-      EXPECT_LT(test::farthest(got, expected), 1e-9 * size)
-          << (mode == EditMode::natural ? "natural" : "stiff");
+      EXPECT_LT(test::farthest(got, expected), 1e-9 * size) << name;
     }
   }
 };

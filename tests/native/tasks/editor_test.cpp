@@ -18,16 +18,16 @@ TEST(Editor, HandleVerticesAreExactlyOnTheirTargets) {
   const Points free = test::noise(2, 3, 1);
   const Eigen::Matrix4d matrix = test::affine(test::rotation(2), {0.3, 0.1, -0.2});
   const Editor editor(prepared, handles, test::editing_network());
-  for (const EditMode mode : {EditMode::natural, EditMode::stiff}) {
+  for (const auto& [name, options] : test::kinds()) {
     const Points got =
         editor
             .solve({{}, {.matrix = {}, .positions = free}, {.matrix = matrix, .positions = {}}},
-                   {.mode = mode})
+                   options)
             .vertices;
     ASSERT_EQ(got.rows(), mesh.vertices.rows());
-    EXPECT_TRUE(got.allFinite());
+    EXPECT_TRUE(got.allFinite()) << name;
     for (const int i : handles[0].vertices) {
-      EXPECT_EQ(got.row(i), mesh.vertices.row(i));
+      EXPECT_EQ(got.row(i), mesh.vertices.row(i)) << name;
     }
     for (int i = 0; i < 2; ++i) {
       EXPECT_EQ(got.row(handles[1].vertices[i]), free.row(i));
@@ -45,11 +45,11 @@ TEST_P(EditorZoo, ABendStaysFiniteAndNearTheMesh) {
   const zoo::Mesh& mesh = GetParam().mesh;
   const test::Edit edit = test::bending(mesh.vertices, mesh.vertices.rows() < 12 ? 1 : 4);
   const Editor editor(test::prepared(mesh), edit.handles, test::editing_network());
-  for (const EditMode mode : {EditMode::natural, EditMode::stiff}) {
-    const Points got = editor.solve(edit.targets, {.mode = mode}).vertices;
+  for (const auto& [name, options] : test::kinds()) {
+    const Points got = editor.solve(edit.targets, options).vertices;
     ASSERT_EQ(got.rows(), mesh.vertices.rows());
-    ASSERT_TRUE(got.allFinite());
-    EXPECT_LT(test::diagonal(got), 4.0 * test::diagonal(mesh.vertices));
+    ASSERT_TRUE(got.allFinite()) << name;
+    EXPECT_LT(test::diagonal(got), 4.0 * test::diagonal(mesh.vertices)) << name;
   }
 }
 
@@ -67,12 +67,20 @@ TEST_F(BendingEditor, ReportsWhatWasDone) {
   const Editor editor(prepared, edit.handles, network);
   EditReport report = editor.solve(edit.targets, {.rounds = 2, .passes = 7}).report;
   EXPECT_EQ(report.rounds, 2);
+  EXPECT_EQ(report.polish, 1);
   EXPECT_EQ(report.passes, 0);
   EXPECT_TRUE(report.network);
   EXPECT_GE(report.total_milliseconds, report.rounds_milliseconds);
-  report =
-      editor.solve(edit.targets, {.mode = EditMode::stiff, .passes = 7, .network = false}).report;
+  report = editor.solve(edit.targets, {.stiffness = 1.0, .passes = 7, .network = false}).report;
   EXPECT_EQ(report.passes, 7);
+  EXPECT_FALSE(report.network);
+  report = editor.solve(edit.targets, {.stiffness = 0.5, .polish = 3, .passes = 20}).report;
+  EXPECT_EQ(report.polish, 3);
+  EXPECT_EQ(report.passes, 5);  // the square of the stiffness
+  EXPECT_TRUE(report.network);
+  report = editor.solve(edit.targets, {.method = EditMethod::arap, .passes = 4}).report;
+  EXPECT_EQ(report.polish, 0);
+  EXPECT_EQ(report.passes, 4);
   EXPECT_FALSE(report.network);
   EXPECT_FALSE(Editor(prepared, edit.handles, nullptr).solve(edit.targets).report.network);
 }
@@ -99,8 +107,8 @@ TEST_F(BendingEditor, StiffDistortsLessThanNaturalAndMorePassesLess) {
                                editor.solve(edit.targets, options).vertices);
   };
   const double natural = distortion({});
-  const double few = distortion({.mode = EditMode::stiff, .passes = 5});
-  const double many = distortion({.mode = EditMode::stiff, .passes = 60});
+  const double few = distortion({.stiffness = 1.0, .passes = 5});
+  const double many = distortion({.stiffness = 1.0, .passes = 60});
   EXPECT_LT(few, natural);
   EXPECT_LT(many, few);
 }
@@ -138,7 +146,7 @@ TEST_F(BendingEditor, AnotherOrderOfHandlesIsTheSameEdit) {
 TEST_F(BendingEditor, ProgressEndsAtOne) {
   Progress progress;
   const Editor editor(prepared, edit.handles, network);
-  editor.solve(edit.targets, {.mode = EditMode::stiff}, ProgressRange(&progress));
+  editor.solve(edit.targets, {.stiffness = 1.0}, ProgressRange(&progress));
   EXPECT_DOUBLE_EQ(progress.fraction(), 1.0);
 }
 
@@ -154,13 +162,13 @@ TEST_F(BendingEditor, SeveralThreadsGiveTheSameBytes) {
   std::vector<Points> expected, results(4);
   for (size_t t = 0; t < targets.size(); ++t) {
     (*targets[t][1].matrix)(0, 3) += 0.1 * static_cast<double>(t);
-    expected.push_back(editor.solve(targets[t], {.mode = EditMode::stiff, .passes = 3}).vertices);
+    expected.push_back(editor.solve(targets[t], {.stiffness = 1.0, .passes = 3}).vertices);
   }
   std::vector<std::thread> threads;
   for (size_t t = 0; t < targets.size(); ++t) {
     threads.emplace_back([&, t] {
       for (int i = 0; i < 3; ++i) {
-        results[t] = editor.solve(targets[t], {.mode = EditMode::stiff, .passes = 3}).vertices;
+        results[t] = editor.solve(targets[t], {.stiffness = 1.0, .passes = 3}).vertices;
       }
     });
   }

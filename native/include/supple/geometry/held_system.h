@@ -26,7 +26,8 @@ class HeldSystem {
   /// The same system with other rows held, on the same factor: rows that are held now are
   /// multipliers, rows that no longer are become unknowns beside it, and both together a small
   /// dense system (a Schur complement). Nothing where more than kMostChanges rows differ from those
-  /// that were factored. Errors: as above.
+  /// that were factored, or where that system is singular to rounding: a factor of its own then
+  /// says whether the whole is definite. Errors: `index_out_of_range`, `overlapping_handles`.
   std::optional<HeldSystem> changed(const Eigen::VectorXi& held) const;
 
   const Eigen::VectorXi& held() const { return held_; }

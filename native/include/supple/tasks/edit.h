@@ -121,9 +121,9 @@ class EditSession {
 
   /// New targets; what was done for the last ones is dropped. Errors: those of `Editor::solve`.
   void aim(const std::vector<HandleTarget>& targets);
-  /// Works until about this many milliseconds have passed, at least to a usable pose, and returns
-  /// it. Stopped at any time and called again, it ends where `Editor::solve` does. Errors:
-  /// `bad_option` before the first `aim`.
+  /// Works until about this many milliseconds have passed, at least one step and to a usable pose,
+  /// and returns it. Stopped at any time and called again, it ends where `Editor::solve` does.
+  /// Errors: `bad_option` before the first `aim`.
   EditResult advance(double milliseconds);
   /// Whether another `advance` would change nothing.
   bool settled() const;

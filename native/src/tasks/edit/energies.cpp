@@ -34,20 +34,22 @@ MatrixField tangential(const SurfaceOperators& operators, const Points& moved) {
   return result;
 }
 
-// n x 9: the rotation of each vertex.
-MatrixField vertex_rotations(const SurfaceOperators& operators, const MatrixField& jacobians) {
+// n x 9: the rotation of each vertex, by its faces' weights: those of their terms in the energy, of
+// which it is then the minimum, so that the gradient needs none of its derivatives.
+MatrixField vertex_rotations(const SurfaceOperators& operators, const MatrixField& jacobians,
+                             const Eigen::VectorXd& weights) {
   const CornerTable& corners = operators.corners;
   MatrixField sums(operators.vertices.rows(), 9);
 #pragma omp parallel for schedule(static)
   for (Eigen::Index v = 0; v < sums.rows(); ++v) {
     Eigen::Matrix<double, 1, 9> sum = Eigen::Matrix<double, 1, 9>::Zero();
-    double area = 0.0;
+    double total = 0.0;
     for (int i = corners.first[v]; i < corners.first[v + 1]; ++i) {
       const int f = corners.corner[i] / 3;
-      area += operators.face_areas[f];
-      sum += operators.face_areas[f] * jacobians.row(f);
+      total += weights[f];
+      sum += weights[f] * jacobians.row(f);
     }
-    sums.row(v) = sum / area;
+    sums.row(v) = sum / total;
   }
   return closest_rotations(sums);
 }
@@ -68,7 +70,7 @@ Matrix3 face_target(const SurfaceOperators& operators, const MatrixField& rotati
 
 double ArapEnergy::evaluate(const Points& moved, Points& gradient) const {
   const MatrixField jacobians = tangential(operators_, moved);
-  const MatrixField rotations = vertex_rotations(operators_, jacobians);
+  const MatrixField rotations = vertex_rotations(operators_, jacobians, operators_.face_areas);
   MatrixField stress(jacobians.rows(), 9);
   Eigen::VectorXd value(jacobians.rows());
 #pragma omp parallel for schedule(static)
@@ -89,7 +91,8 @@ StiffEnergy::StiffEnergy(const SurfaceOperators& operators)
 
 double StiffEnergy::evaluate(const Points& moved, Points& gradient) const {
   const MatrixField jacobians = tangential(operators_, moved);
-  const MatrixField rotations = vertex_rotations(operators_, jacobians);
+  const MatrixField rotations =
+      vertex_rotations(operators_, jacobians, operators_.face_areas.cwiseProduct(bending_));
   MatrixField stress(jacobians.rows(), 9);
   Eigen::VectorXd value(jacobians.rows());
 #pragma omp parallel for schedule(static)

@@ -362,6 +362,9 @@ EditResult EditSession::advance(double milliseconds) {
     throw Error(ErrorCode::bad_option, "The session has no targets yet. Call aim first.");
   }
   const Stopwatch watch;
+  if (!state_->settled()) {
+    state_->step();
+  }
   while (!state_->settled() &&
          (state_->next < state_->usable() || watch.milliseconds() < milliseconds)) {
     state_->step();
