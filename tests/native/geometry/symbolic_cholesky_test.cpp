@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Analyses shared by several factorisations, and solves with many right-hand sides.
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -8,7 +7,6 @@
 #include <thread>
 #include <vector>
 
-#include "geometry/supernodal_solve.h"
 #include "native/support.h"
 #include "supple/geometry/sparse_cholesky.h"
 #include "supple/geometry/surface_operators.h"
@@ -252,96 +250,6 @@ INSTANTIATE_TEST_SUITE_P(Backends, SymbolicCholeskyBackends,
                          ::testing::Values(Backend::cholmod, Backend::eigen), [](const auto& info) {
                            return info.param == Backend::cholmod ? "cholmod" : "eigen";
                          });
-
-// --- the supernodal solve alone
-// -------------------------------------------------------------------
-
-// L of a random definite matrix whose pattern is made of supernodes of the given widths, each
-// coupled to every `step`-th row after it; laid out as solve_panel wants it, and dense.
-struct Layout {
-  Layout(const std::vector<int>& widths, int step) {
-    super.push_back(0);
-    for (const int width : widths) {
-      super.push_back(super.back() + width);
-    }
-    const int n = super.back();
-    dense = Eigen::MatrixXd::Zero(n, n);
-    uint64_t seed = 1;
-    row_start.push_back(0);
-    for (size_t s = 0; s < widths.size(); ++s) {
-      const int first = super[s], after = super[s + 1];
-      for (int i = first; i < after; ++i) {
-        rows.push_back(i);
-      }
-      for (int i = after + static_cast<int>(s); i < n; i += step) {
-        rows.push_back(i);
-      }
-      row_start.push_back(static_cast<int>(rows.size()));
-      const int height = row_start[s + 1] - row_start[s];
-      value_start.push_back(static_cast<int>(values.size()));
-      for (int j = first; j < after; ++j) {
-        const RowMatrix<double> column = test::noise(height, 1, seed++);
-        for (int i = 0; i < height; ++i) {
-          const int row = rows[static_cast<size_t>(row_start[s] + i)];
-          // Above the diagonal, CHOLMOD leaves anything.
-          const double value = row < j ? 1e300 : row == j ? 3.0 + column(i, 0) : column(i, 0);
-          values.push_back(value);
-          if (row >= j) {
-            dense(row, j) = value;
-          }
-        }
-      }
-    }
-    value_start.push_back(static_cast<int>(values.size()));
-  }
-  SupernodalFactor view() const {
-    return {static_cast<int>(super.size()) - 1,
-            super.data(),
-            row_start.data(),
-            value_start.data(),
-            rows.data(),
-            values.data()};
-  }
-  std::vector<int> super, row_start, value_start, rows;
-  std::vector<double> values;
-  Eigen::MatrixXd dense;
-};
-
-void expect_panels_solve() {
-  const std::vector<std::vector<int>> supernodes = {
-      {1}, {2}, {13}, {1, 1, 1, 1, 1}, {3, 4, 5, 6, 7}, {8, 1, 17, 2, 4}};
-  for (const auto& widths : supernodes) {
-    for (const int step : {1, 2, 5}) {
-      const Layout layout(widths, step);
-      const Eigen::Index n = layout.dense.rows();
-      for (const int width : kPanelWidths) {
-        std::vector<double> room(static_cast<size_t>(n * width) + 8);
-        auto* const panel =
-            reinterpret_cast<double*>((reinterpret_cast<uintptr_t>(room.data()) + 63) / 64 * 64);
-        Eigen::Map<RowMatrix<double>> x(panel, n, width);
-        const RowMatrix<double> known = test::noise(n, width, 7);
-        x = layout.dense * (layout.dense.transpose() * known);
-        solve_panel(layout.view(), panel, width, Substitution::both);
-        const double condition =
-            std::pow(layout.dense.norm(), 2) * std::pow(layout.dense.inverse().norm(), 2);
-        EXPECT_LT((x - known).norm(), 1e-15 * condition * known.norm())
-            << widths.size() << " supernodes, every " << step << " row, width " << width;
-        x = layout.dense * known;
-        solve_panel(layout.view(), panel, width, Substitution::forward);
-        EXPECT_LT((x - known).norm(), 1e-15 * condition * known.norm()) << "forward";
-        x = layout.dense.transpose() * known;
-        solve_panel(layout.view(), panel, width, Substitution::backward);
-        EXPECT_LT((x - known).norm(), 1e-15 * condition * known.norm()) << "backward";
-      }
-    }
-  }
-}
-
-TEST(SupernodalSolve, SolvesHandMadeFactors) { expect_panels_solve(); }
-
-TEST(SupernodalSolveDeathTest, EveryInstructionSetSolves) {
-  test::at_every_simd_level(expect_panels_solve);
-}
 
 }  // namespace
 }  // namespace supple
