@@ -132,10 +132,13 @@ TEST_F(TwistedBar, BentByARightAngleTheMiddleTurnsByHalfOfIt) {
     for (const int i : rows) {
       middle += got.row(i) / static_cast<double>(rows.size());
     }
-    // The middle of the quarter circle.
+    // The middle of the quarter circle; least distortion lets a hollow bar kink on the inside.
+    const bool strains_least = options.stiffness > 0.0;
     const double half = std::sqrt(0.5) * radius;
-    EXPECT_LT((middle - Eigen::RowVector3d(0, half - radius, half)).norm(), 0.05 * kHeight) << name;
-    EXPECT_GT(volume(got, mesh.faces), 0.8 * kHeight) << name;
+    EXPECT_LT((middle - Eigen::RowVector3d(0, half - radius, half)).norm(),
+              (strains_least ? 0.07 : 0.05) * kHeight)
+        << name;
+    EXPECT_GT(volume(got, mesh.faces), (strains_least ? 0.7 : 0.8) * kHeight) << name;
   }
 }
 
