@@ -10,6 +10,7 @@
 
 #include "geometry/supernodal_solve.h"
 #include "native/support.h"
+#include "supple/core/parallel.h"
 #include "supple/geometry/sparse_cholesky.h"
 #include "supple/geometry/surface_operators.h"
 
@@ -257,7 +258,7 @@ INSTANTIATE_TEST_SUITE_P(Backends, SymbolicCholeskyBackends,
 // -------------------------------------------------------------------
 
 // L of a random definite matrix whose pattern is made of supernodes of the given widths, each
-// coupled to every `step`-th row after it; laid out as solve_panel wants it, and dense.
+// coupled to every `step`-th row after it; laid out as the solves want it, and dense.
 struct Layout {
   Layout(const std::vector<int>& widths, int step) {
     super.push_back(0);
@@ -321,19 +322,76 @@ void expect_panels_solve() {
         Eigen::Map<RowMatrix<double>> x(panel, n, width);
         const RowMatrix<double> known = test::noise(n, width, 7);
         x = layout.dense * (layout.dense.transpose() * known);
-        solve_panel(layout.view(), panel, width, Substitution::both);
+        const SupernodeRange all{0, layout.view().supernodes};
+        forward_panel(layout.view(), all, panel, width);
+        backward_panel(layout.view(), all, panel, width);
         const double condition =
             std::pow(layout.dense.norm(), 2) * std::pow(layout.dense.inverse().norm(), 2);
         EXPECT_LT((x - known).norm(), 1e-15 * condition * known.norm())
             << widths.size() << " supernodes, every " << step << " row, width " << width;
         x = layout.dense * known;
-        solve_panel(layout.view(), panel, width, Substitution::forward);
+        forward_panel(layout.view(), all, panel, width);
         EXPECT_LT((x - known).norm(), 1e-15 * condition * known.norm()) << "forward";
         x = layout.dense.transpose() * known;
-        solve_panel(layout.view(), panel, width, Substitution::backward);
+        backward_panel(layout.view(), all, panel, width);
         EXPECT_LT((x - known).norm(), 1e-15 * condition * known.norm()) << "backward";
       }
     }
+  }
+}
+
+// The rows of some ranges.
+std::vector<int> rows_of(const SupernodalFactor& factor,
+                         const std::vector<SupernodeRange>& ranges) {
+  std::vector<int> rows;
+  for (const SupernodeRange& range : ranges) {
+    for (int r = factor.super[range.first]; r < factor.super[range.last]; ++r) {
+      rows.push_back(r);
+    }
+  }
+  return rows;
+}
+
+TEST(SupernodeParts, ASmallFactorIsAllTop) {
+  const Layout layout({3, 4, 5}, 1);
+  const SupernodeParts parts = supernode_parts(layout.view(), layout.super.back());
+  for (const auto& part : parts.parts) {
+    EXPECT_TRUE(part.empty());
+  }
+  EXPECT_EQ(rows_of(layout.view(), parts.top).size(), 12u);
+}
+
+// Some hundred thousand entries: few columns are then solved for by the parts of the tree, many one
+// panel after the other.
+TEST(SupernodalSolve, FewColumnsOfALargeSystemAreThoseOfMany) {
+  if (!SparseCholesky::available(Backend::cholmod)) {
+    GTEST_SKIP() << "this build has no CHOLMOD";
+  }
+  const zoo::Mesh mesh = zoo::torus(120, 60);
+  const SurfaceOperators operators{TriangleMesh(mesh.vertices, mesh.faces)};
+  SparseMatrix matrix = operators.laplacian;
+  matrix.diagonal() += operators.mass;
+  const SparseCholesky factor(matrix, Backend::cholmod);
+  ASSERT_GT(factor.factor_entries(), 100'000);
+  const RowMatrix<double> rhs = test::noise(matrix.rows(), 12, 3);
+  const RowMatrix<double> many = factor.solve(rhs);
+  const RowMatrix<double> halves = factor.forward(rhs);
+  for (const Eigen::Index count : {1, 3, 4}) {
+    const RowMatrix<double> some = rhs.leftCols(count);
+    const RowMatrix<double> few = factor.solve(some);
+    const double size = few.norm();
+    EXPECT_LT((few - many.leftCols(count)).norm(), 1e-12 * size) << count;
+    EXPECT_LT((matrix * few - some).norm(), 1e-12 * some.norm() * size) << count;
+    const RowMatrix<double> half = factor.forward(some);
+    EXPECT_LT((half - halves.leftCols(count)).norm(), 1e-12 * half.norm()) << count;
+    EXPECT_LT((factor.backward(half) - few).norm(), 1e-12 * size) << count;
+    // The parts are the same for any number of threads, and so is every sum.
+    const int threads = thread_count();
+    for (const int other : {1, 2, 3}) {
+      set_thread_count(other);
+      EXPECT_EQ(factor.solve(some), few) << other << " threads";
+    }
+    set_thread_count(threads);
   }
 }
 
