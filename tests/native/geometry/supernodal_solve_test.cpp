@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "native/support.h"
+#include "supple/core/parallel.h"
 #include "supple/geometry/sparse_cholesky.h"
 #include "supple/geometry/surface_operators.h"
 
@@ -198,6 +199,40 @@ TEST(SupernodeParts, DoNotTouchAndShareTheWork) {
     EXPECT_LE(supernodes, 6);
   }
   EXPECT_EQ(parts.top_rows.size(), 90u);
+}
+
+// Some hundred thousand entries: few columns are then solved for by the parts of the tree, many one
+// panel after the other.
+TEST(SupernodalSolve, FewColumnsOfALargeSystemAreThoseOfMany) {
+  if (!SparseCholesky::available(CholeskyBackend::cholmod)) {
+    GTEST_SKIP() << "this build has no CHOLMOD";
+  }
+  const zoo::Mesh mesh = zoo::torus(120, 60);
+  const SurfaceOperators operators{TriangleMesh(mesh.vertices, mesh.faces)};
+  SparseMatrix matrix = operators.laplacian;
+  matrix.diagonal() += operators.mass;
+  const SparseCholesky factor(matrix, CholeskyBackend::cholmod);
+  ASSERT_GT(factor.factor_entries(), 100'000);
+  const RowMatrix<double> rhs = test::noise(matrix.rows(), 12, 3);
+  const RowMatrix<double> many = factor.solve(rhs);
+  const RowMatrix<double> halves = factor.forward(rhs);
+  for (const Eigen::Index count : {1, 3, 4}) {
+    const RowMatrix<double> some = rhs.leftCols(count);
+    const RowMatrix<double> few = factor.solve(some);
+    const double size = few.norm();
+    EXPECT_LT((few - many.leftCols(count)).norm(), 1e-12 * size) << count;
+    EXPECT_LT((matrix * few - some).norm(), 1e-12 * some.norm() * size) << count;
+    const RowMatrix<double> half = factor.forward(some);
+    EXPECT_LT((half - halves.leftCols(count)).norm(), 1e-12 * half.norm()) << count;
+    EXPECT_LT((factor.backward(half) - few).norm(), 1e-12 * size) << count;
+    // The parts are the same for any number of threads, and so is every sum.
+    const int threads = thread_count();
+    for (const int other : {1, 2, 3}) {
+      set_thread_count(other);
+      EXPECT_EQ(factor.solve(some), few) << other << " threads";
+    }
+    set_thread_count(threads);
+  }
 }
 
 // Large enough that few columns are solved by parts; many are always solved by columns.
