@@ -16,6 +16,10 @@ namespace {
 constexpr int kFoldInterval = 8;
 constexpr int kMostStiffenings = 10;
 
+// The network's stretch S goes no farther from the identity than this, |S - I|. Beyond are faces
+// that collapse: in its training, the inner sides of joints, where true poses cut into themselves.
+constexpr double kMostStretch = 0.4;
+
 class Stopwatch {
  public:
   double milliseconds() const {
@@ -229,8 +233,11 @@ void EditSession::State::round(bool use_network) {
 #pragma omp parallel for schedule(static)
   for (Eigen::Index f = 0; f < jacobians.rows(); ++f) {
     const auto q = matrix_at(rotations, f);
-    const Matrix3 kept = (1.0 - options.stiffness) * matrix_at(jacobians, f) * q.transpose() +
-                         options.stiffness * Matrix3::Identity();
+    const Matrix3 away = matrix_at(jacobians, f) * q.transpose() - Matrix3::Identity();
+    const double size = away.norm();
+    const double share =
+        (1.0 - options.stiffness) * (size > kMostStretch ? kMostStretch / size : 1.0);
+    const Matrix3 kept = Matrix3::Identity() + share * away;
     matrix_at(stretch, f) = kept;
     matrix_at(jacobians, f) = kept * q;
   }
