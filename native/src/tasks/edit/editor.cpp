@@ -10,10 +10,10 @@
 namespace supple {
 namespace {
 
-Points rows_of(const Points& points, const std::vector<int>& indices, size_t first) {
-  Points result(static_cast<Eigen::Index>(indices.size() - first), 3);
+Points rows_of(const Points& points, const std::vector<int>& indices) {
+  Points result(static_cast<Eigen::Index>(indices.size()), 3);
   for (Eigen::Index i = 0; i < result.rows(); ++i) {
-    result.row(i) = points.row(indices[first + static_cast<size_t>(i)]);
+    result.row(i) = points.row(indices[static_cast<size_t>(i)]);
   }
   return result;
 }
@@ -32,8 +32,8 @@ Eigen::VectorXi anchors(const SurfaceOperators& operators, const std::vector<boo
   if (loose.empty()) {
     return anchor;
   }
-  const NearestPoints::Result nearest = NearestPoints(rows_of(operators.vertices, firm, 0))
-                                            .query(rows_of(operators.vertices, loose, 0));
+  const NearestPoints::Result nearest =
+      NearestPoints(rows_of(operators.vertices, firm)).query(rows_of(operators.vertices, loose));
   Eigen::VectorXd best =
       Eigen::VectorXd::Constant(operators.component_count, std::numeric_limits<double>::max());
   for (size_t i = 0; i < loose.size(); ++i) {
@@ -45,6 +45,37 @@ Eigen::VectorXi anchors(const SurfaceOperators& operators, const std::vector<boo
     }
   }
   return anchor;
+}
+
+// Places in `held` whose rotations are interpolated: those of each handle that stand for all of it,
+// what a loose piece is held by, and one of every component that is then still without.
+// groups: the handle of each, -1 for a loose piece's; a handle's places are contiguous.
+Eigen::VectorXi choose_guides(const SurfaceOperators& operators, const std::vector<int>& held,
+                              const std::vector<int>& groups) {
+  std::vector<int> guides;
+  std::vector<bool> guided(static_cast<size_t>(operators.component_count), false);
+  const auto take = [&](size_t place) {
+    guides.push_back(static_cast<int>(place));
+    guided[static_cast<size_t>(operators.component[held[place]])] = true;
+  };
+  for (size_t first = 0; first < held.size();) {
+    size_t last = first + 1;
+    while (last < held.size() && groups[first] >= 0 && groups[last] == groups[first]) {
+      ++last;
+    }
+    const std::vector<int> handle(held.begin() + static_cast<std::ptrdiff_t>(first),
+                                  held.begin() + static_cast<std::ptrdiff_t>(last));
+    for (const int place : far_apart(rows_of(operators.vertices, handle))) {
+      take(first + static_cast<size_t>(place));
+    }
+    first = last;
+  }
+  for (size_t place = 0; place < held.size(); ++place) {
+    if (!guided[static_cast<size_t>(operators.component[held[place]])]) {
+      take(place);
+    }
+  }
+  return vector_of(guides);
 }
 
 }  // namespace
@@ -97,19 +128,6 @@ void Editor::bind(const Editor* former, const ProgressRange& progress) {
                 "No handle has a vertex of a face with an area, so nothing can follow them.");
   }
   handle_rows_ = static_cast<Eigen::Index>(held.size());
-  std::vector<int> guides;
-  for (size_t first = 0; first < held.size();) {  // a handle's rows are contiguous
-    size_t last = first;
-    while (last < held.size() && groups[last] == groups[first]) {
-      ++last;
-    }
-    for (const int place :
-         far_apart(rows_of(operators.vertices, {held.begin() + first, held.begin() + last}, 0))) {
-      guides.push_back(static_cast<int>(first) + place);
-    }
-    first = last;
-  }
-
   // Loose pieces go with the whole in the solves and are placed afterwards.
   anchor_ = anchors(operators, has_handle);
   std::vector<bool> met(has_handle);
@@ -117,7 +135,6 @@ void Editor::bind(const Editor* former, const ProgressRange& progress) {
     const auto piece = static_cast<size_t>(operators.component[i]);
     if (!met[piece]) {
       met[piece] = true;
-      guides.push_back(static_cast<int>(held.size()));
       held.push_back(i);
       groups.push_back(-1);
     }
@@ -126,24 +143,12 @@ void Editor::bind(const Editor* former, const ProgressRange& progress) {
   held_slot_ = vector_of(slots);
   held_handle_ = vector_of(groups);
 
+  guides_ = choose_guides(operators, held, groups);
+  Eigen::VectorXi points(guides_.size());
+  for (Eigen::Index g = 0; g < points.size(); ++g) {
+    points[g] = held_[guides_[g]];
+  }
   progress.report(0.1);
-  std::vector<int> points;
-  std::vector<int> kept;  // a component whose handle has no guide of its own gets one
-  std::vector<bool> guided(static_cast<size_t>(operators.component_count), false);
-  for (const int guide : guides) {
-    guided[static_cast<size_t>(operators.component[held[static_cast<size_t>(guide)]])] = true;
-  }
-  for (size_t i = 0; i < held.size(); ++i) {
-    const auto piece = static_cast<size_t>(operators.component[held[i]]);
-    if (!guided[piece]) {
-      guided[piece] = true;
-      guides.push_back(static_cast<int>(i));
-    }
-  }
-  guides_ = vector_of(guides);
-  for (const int guide : guides) {
-    points.push_back(held[static_cast<size_t>(guide)]);
-  }
   if (former != nullptr) {
     if (std::optional<HeldSystem> changed = former->poisson_->changed(held_)) {
       poisson_ = std::make_shared<const HeldSystem>(std::move(*changed));
@@ -154,7 +159,7 @@ void Editor::bind(const Editor* former, const ProgressRange& progress) {
   }
   progress.report(0.5);
   interpolation_ = std::make_shared<const BiharmonicInterpolation>(
-      prepared_->pinned(), vector_of(points),
+      prepared_->pinned(), std::move(points),
       former == nullptr ? nullptr : former->interpolation_.get());
 }
 
