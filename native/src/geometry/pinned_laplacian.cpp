@@ -175,7 +175,6 @@ void BiharmonicInterpolation::find_kernels(const BiharmonicInterpolation* former
   const Eigen::Index blocks = (count + kKernelWidth - 1) / kKernelWidth;
   kernels_.resize(static_cast<size_t>(blocks));
   TallPieces<double> pieces;
-  std::vector<std::shared_ptr<RowMatrix<double>>> made;
   for (Eigen::Index b = 0; b < blocks; ++b) {
     if (kept_block(b)) {
       kernels_[static_cast<size_t>(b)] = former->kernels_[static_cast<size_t>(b)];

@@ -5,12 +5,10 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <utility>
-#include <vector>
 
 #include "supple/core/error.h"
 #include "supple/geometry/mesh.h"
+#include "supple/geometry/surface_operators.h"
 
 namespace supple {
 namespace {
@@ -47,27 +45,6 @@ double distortion(const Eigen::Matrix2d& rest, const Eigen::Matrix2d& posed) {
   return s1 * s1 + s2 * s2 + 1.0 / (s1 * s1) + 1.0 / (s2 * s2) - 4.0;
 }
 
-// For each face, the sum of the unit normals of the faces that share an edge with it.
-Points neighbour_normals(const Points& normals, const Faces& faces) {
-  std::map<std::pair<int, int>, std::vector<int>> faces_of_edge;
-  for (int f = 0; f < faces.rows(); ++f) {
-    for (int c = 0; c < 3; ++c) {
-      faces_of_edge[std::minmax({faces(f, c), faces(f, (c + 1) % 3)})].push_back(f);
-    }
-  }
-  Points sums = Points::Zero(faces.rows(), 3);
-  for (const auto& [edge, around] : faces_of_edge) {
-    for (const int a : around) {
-      for (const int b : around) {
-        if (a != b) {
-          sums.row(a) += normals.row(b);
-        }
-      }
-    }
-  }
-  return sums;
-}
-
 }  // namespace
 
 Eigen::VectorXd face_distortion(const Points& rest, const Faces& faces, const Points& posed) {
@@ -91,8 +68,9 @@ int flipped_faces(const Points& rest, const Faces& faces, const Points& posed) {
   check_same(rest, posed);
   const Points rest_normals = face_normals(rest, faces);
   const Points posed_normals = face_normals(posed, faces);
-  const Points rest_around = neighbour_normals(rest_normals, faces);
-  const Points posed_around = neighbour_normals(posed_normals, faces);
+  const CornerTable corners(faces, rest.rows());
+  const Points rest_around = neighbour_normals(rest_normals, faces, corners);
+  const Points posed_around = neighbour_normals(posed_normals, faces, corners);
   const Eigen::VectorXd rest_areas = face_areas(rest, faces);
   const Eigen::VectorXd posed_areas = face_areas(posed, faces);
   int count = 0;

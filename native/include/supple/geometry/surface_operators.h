@@ -16,6 +16,9 @@ struct CornerTable {
   Eigen::VectorXi corner;  ///< 3 m
 };
 
+/// m x 3: for each face, the sum of the normals (m x 3) of the faces that share an edge with it.
+Points neighbour_normals(const Points& normals, const Faces& faces, const CornerTable& corners);
+
 /// Every operator of a rest surface that the tasks use, built once. n vertices, m faces, area 1.
 struct SurfaceOperators {
   explicit SurfaceOperators(const TriangleMesh& mesh);

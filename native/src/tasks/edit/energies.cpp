@@ -119,24 +119,10 @@ double StiffEnergy::evaluate(const Points& moved, Points& gradient) const {
 
 Eigen::VectorXi StiffEnergy::turned_over(const Points& points) const {
   const Points normals = face_normals(points, operators_.faces);
-  const CornerTable& corners = operators_.corners;
+  const Points around = neighbour_normals(normals, operators_.faces, operators_.corners);
   Eigen::VectorXi result(normals.rows());
-#pragma omp parallel for schedule(static)
   for (Eigen::Index f = 0; f < result.size(); ++f) {
-    const auto face = operators_.faces.row(f);
-    Eigen::RowVector3d around = Eigen::RowVector3d::Zero();
-    for (int c = 0; c < 3; ++c) {
-      // The faces across the edge from this corner to the next: met at this corner only.
-      const int from = face[c], to = face[(c + 1) % 3];
-      for (int i = corners.first[from]; i < corners.first[from + 1]; ++i) {
-        const int other = corners.corner[i] / 3;
-        const auto its = operators_.faces.row(other);
-        if (other != f && (its[0] == to || its[1] == to || its[2] == to)) {
-          around += normals.row(other);
-        }
-      }
-    }
-    result[f] = normals.row(f).dot(around) < 0.0 ? 1 : 0;
+    result[f] = normals.row(f).dot(around.row(f)) < 0.0 ? 1 : 0;
   }
   return result;
 }

@@ -63,9 +63,9 @@ struct EditSession::State {
   }
 
   const SurfaceOperators& operators() const { return editor->prepared_->operators; }
-  int step_count() const { return 1 + options.rounds + polish + passes; }
-  /// Steps until there is a pose to show.
+  /// Steps until there is a pose to show; passes follow.
   int usable() const { return 1 + options.rounds + polish; }
+  int step_count() const { return usable() + passes; }
   bool settled() const { return next >= step_count(); }
   void aim(const std::vector<HandleTarget>& targets);
   void step();
@@ -291,7 +291,7 @@ void EditSession::State::pass() {
 
 void EditSession::State::step() {
   const Stopwatch watch;
-  const int first_polish = 1 + options.rounds, first_pass = first_polish + polish;
+  const int first_polish = 1 + options.rounds;
   if (next == 0) {
     suggest();
     report.suggestion_milliseconds += watch.milliseconds();
@@ -299,7 +299,7 @@ void EditSession::State::step() {
     round(with_network && next - 1 + options.network_rounds >= options.rounds);
     ++report.rounds;
     report.rounds_milliseconds += watch.milliseconds();
-  } else if (next < first_pass) {
+  } else if (next < usable()) {
     polish_pass();
     ++report.polish;
     report.rounds_milliseconds += watch.milliseconds();
