@@ -7,6 +7,7 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <mutex>
 #include <new>
 #include <optional>
 #include <vector>
@@ -73,12 +74,14 @@ void check_memory(const Session& session) {
 }
 
 struct FreeAligned {
-  void operator()(double* p) const { ::operator delete[](p, std::align_val_t(64)); }
+  void operator()(void* p) const { ::operator delete[](p, std::align_val_t(64)); }
 };
-using AlignedArray = std::unique_ptr<double[], FreeAligned>;
-AlignedArray aligned_array(size_t count) {
-  return AlignedArray(
-      static_cast<double*>(::operator new[](count * sizeof(double), std::align_val_t(64))));
+template <class Scalar>
+using AlignedArray = std::unique_ptr<Scalar[], FreeAligned>;
+template <class Scalar>
+AlignedArray<Scalar> aligned_array(size_t count) {
+  return AlignedArray<Scalar>(
+      static_cast<Scalar*>(::operator new[](count * sizeof(Scalar), std::align_val_t(64))));
 }
 
 // The widest panel that still gives each thread one, and no wider than needed.
@@ -100,53 +103,75 @@ class CholmodFactor : public Factor {
   }
   Eigen::Index entries() const override { return static_cast<Eigen::Index>(factor_->xsize); }
 
-  RowMatrix<double> solve(const RowMatrix<double>& rhs, Substitution part) const override {
+  RowMatrix<double> solve(const RowMatrix<double>& rhs, Substitution part,
+                          Precision precision) const override {
+    return precision == Precision::single ? solve_as<float>(rhs, part, with_single_values())
+                                          : solve_as<double>(rhs, part, view_);
+  }
+
+ private:
+  template <class Scalar>
+  RowMatrix<double> solve_as(const RowMatrix<double>& rhs, Substitution part,
+                             const SupernodalFactor& view) const {
     const Eigen::Index columns = rhs.cols();
     const int threads = omp_in_parallel() ? 1 : omp_get_max_threads();
     // Few columns share the tree, many are shared out.
     return columns <= kPanelWidths[0] && !parts_.top_rows.empty()
-               ? solve_by_parts(rhs, part)
-               : solve_by_columns(rhs, part, panel_width(columns, threads));
+               ? solve_by_parts<Scalar>(rhs, part, view)
+               : solve_by_columns<Scalar>(rhs, part, view, panel_width(columns, threads));
   }
 
- private:
+  SupernodalFactor with_single_values() const {
+    std::call_once(rounded_, [&] {
+      const auto entries = static_cast<Eigen::Index>(factor_->xsize);
+      single_values_ = aligned_array<float>(factor_->xsize);
+      Eigen::Map<Eigen::VectorXf>(single_values_.get(), entries) =
+          Eigen::Map<const Eigen::VectorXd>(view_.values, entries).cast<float>();
+    });
+    SupernodalFactor view = view_;
+    view.single_values = single_values_.get();
+    return view;
+  }
+
+
   // Where row i of a right-hand side or solution is.
   Eigen::Index place(Eigen::Index i, bool ordered) const {
     return ordered ? i : static_cast<const int*>(factor_->Perm)[i];
   }
 
+  template <class Scalar>
   RowMatrix<double> solve_by_columns(const RowMatrix<double>& rhs, Substitution part,
-                                     int width) const {
+                                     const SupernodalFactor& view, int width) const {
     const Eigen::Index n = rhs.rows(), columns = rhs.cols();
     const bool ordered_in = part == Substitution::backward;
     const bool ordered_out = part == Substitution::forward;
     const int panels = static_cast<int>((columns + width - 1) / width);
-    const SupernodeRange all{0, view_.supernodes};
+    const SupernodeRange all{0, view.supernodes};
     RowMatrix<double> solution(n, columns);
-    std::vector<AlignedArray> buffers;  // allocated here: nothing may be thrown in the loop
+    std::vector<AlignedArray<Scalar>> buffers;  // allocated here: nothing may be thrown in the loop
     for (int p = 0; p < std::min(panels, omp_get_max_threads()); ++p) {
-      buffers.push_back(aligned_array(static_cast<size_t>(n) * static_cast<size_t>(width)));
+      buffers.push_back(aligned_array<Scalar>(static_cast<size_t>(n) * static_cast<size_t>(width)));
     }
 #pragma omp parallel for schedule(static) \
     num_threads(static_cast <int>(buffers.size())) if (panels > 1)
     for (int p = 0; p < panels; ++p) {
-      double* const panel = buffers[static_cast<size_t>(omp_get_thread_num())].get();
+      Scalar* const panel = buffers[static_cast<size_t>(omp_get_thread_num())].get();
       const Eigen::Index first = static_cast<Eigen::Index>(p) * width;
       const Eigen::Index count = std::min<Eigen::Index>(width, columns - first);
       for (Eigen::Index i = 0; i < n; ++i) {
-        double* const to = panel + i * width;
+        Scalar* const to = panel + i * width;
         const double* const from = rhs.data() + place(i, ordered_in) * columns + first;
-        std::copy(from, from + count, to);
-        std::fill(to + count, to + width, 0.0);
+        std::transform(from, from + count, to, [](double x) { return static_cast<Scalar>(x); });
+        std::fill(to + count, to + width, Scalar(0));
       }
       if (part != Substitution::backward) {
-        forward_panel(view_, all, panel, width);
+        forward_panel(view, all, panel, width);
       }
       if (part != Substitution::forward) {
-        backward_panel(view_, all, panel, width);
+        backward_panel(view, all, panel, width);
       }
       for (Eigen::Index i = 0; i < n; ++i) {
-        const double* const from = panel + i * width;
+        const Scalar* const from = panel + i * width;
         std::copy(from, from + count, solution.data() + place(i, ordered_out) * columns + first);
       }
     }
@@ -155,45 +180,48 @@ class CholmodFactor : public Factor {
 
   // One panel; each part of the tree in a copy of its own, which other parts do not read. What the
   // parts add to the top is summed in their order.
-  RowMatrix<double> solve_by_parts(const RowMatrix<double>& rhs, Substitution part) const {
+  template <class Scalar>
+  RowMatrix<double> solve_by_parts(const RowMatrix<double>& rhs, Substitution part,
+                                   const SupernodalFactor& view) const {
     constexpr int kWidth = kPanelWidths[0], kParts = SupernodeParts::kParts;
     const Eigen::Index n = rhs.rows(), columns = rhs.cols();
     const bool ordered_in = part == Substitution::backward;
     const bool ordered_out = part == Substitution::forward;
     const size_t size = static_cast<size_t>(n) * kWidth;
     RowMatrix<double> solution(n, columns);
-    std::vector<AlignedArray> panels;
+    std::vector<AlignedArray<Scalar>> panels;
     for (int p = 0; p <= kParts; ++p) {
-      panels.push_back(aligned_array(size));
+      panels.push_back(aligned_array<Scalar>(size));
     }
-    double* const top = panels.back().get();
-    const auto row_in = [&](Eigen::Index i, double* panel) {
+    Scalar* const top = panels.back().get();
+    const auto row_in = [&](Eigen::Index i, Scalar* panel) {
       const double* const from = rhs.data() + place(i, ordered_in) * columns;
-      std::copy(from, from + columns, panel + i * kWidth);
-      std::fill(panel + i * kWidth + columns, panel + (i + 1) * kWidth, 0.0);
+      std::transform(from, from + columns, panel + i * kWidth,
+                     [](double x) { return static_cast<Scalar>(x); });
+      std::fill(panel + i * kWidth + columns, panel + (i + 1) * kWidth, Scalar(0));
     };
-    const auto row_out = [&](Eigen::Index i, const double* panel) {
-      const double* const from = panel + i * kWidth;
+    const auto row_out = [&](Eigen::Index i, const Scalar* panel) {
+      const Scalar* const from = panel + i * kWidth;
       std::copy(from, from + columns, solution.data() + place(i, ordered_out) * columns);
     };
     const auto for_rows = [&](int p, const auto& visit) {
       for (const SupernodeRange& range : parts_.parts[p]) {
-        for (Eigen::Index i = view_.super[range.first]; i < view_.super[range.last]; ++i) {
+        for (Eigen::Index i = view.super[range.first]; i < view.super[range.last]; ++i) {
           visit(i);
         }
       }
     };
 #pragma omp parallel for schedule(static)
     for (int p = 0; p < kParts; ++p) {
-      double* const panel = panels[static_cast<size_t>(p)].get();
+      Scalar* const panel = panels[static_cast<size_t>(p)].get();
       for (const int i : parts_.top_rows) {
         std::fill(panel + static_cast<size_t>(i) * kWidth,
-                  panel + static_cast<size_t>(i + 1) * kWidth, 0.0);
+                  panel + static_cast<size_t>(i + 1) * kWidth, Scalar(0));
       }
       for_rows(p, [&](Eigen::Index i) { row_in(i, panel); });
       if (part != Substitution::backward) {
         for (const SupernodeRange& range : parts_.parts[p]) {
-          forward_panel(view_, range, panel, kWidth);
+          forward_panel(view, range, panel, kWidth);
         }
       }
     }
@@ -208,12 +236,12 @@ class CholmodFactor : public Factor {
     }
     if (part != Substitution::backward) {
       for (const SupernodeRange& range : parts_.top) {
-        forward_panel(view_, range, top, kWidth);
+        forward_panel(view, range, top, kWidth);
       }
     }
     if (part != Substitution::forward) {
       for (auto range = parts_.top.rbegin(); range != parts_.top.rend(); ++range) {
-        backward_panel(view_, *range, top, kWidth);
+        backward_panel(view, *range, top, kWidth);
       }
     }
     for (const int i : parts_.top_rows) {
@@ -221,7 +249,7 @@ class CholmodFactor : public Factor {
     }
 #pragma omp parallel for schedule(static)
     for (int p = 0; p < kParts; ++p) {
-      double* const panel = panels[static_cast<size_t>(p)].get();
+      Scalar* const panel = panels[static_cast<size_t>(p)].get();
       if (part != Substitution::forward) {
         for (const int i : parts_.top_rows) {
           std::copy(top + static_cast<size_t>(i) * kWidth,
@@ -229,7 +257,7 @@ class CholmodFactor : public Factor {
                     panel + static_cast<size_t>(i) * kWidth);
         }
         for (auto range = parts_.parts[p].rbegin(); range != parts_.parts[p].rend(); ++range) {
-          backward_panel(view_, *range, panel, kWidth);
+          backward_panel(view, *range, panel, kWidth);
         }
       }
       for_rows(p, [&](Eigen::Index i) { row_out(i, panel); });
@@ -240,6 +268,8 @@ class CholmodFactor : public Factor {
   FactorPointer factor_;
   SupernodalFactor view_;
   SupernodeParts parts_;
+  mutable std::once_flag rounded_;
+  mutable AlignedArray<float> single_values_;
 };
 
 }  // namespace

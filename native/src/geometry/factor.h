@@ -18,7 +18,8 @@ class Factor {
   virtual ~Factor() = default;
   virtual Eigen::Index entries() const = 0;
   /// n x c to n x c, c > 0; safe to call from several threads.
-  virtual RowMatrix<double> solve(const RowMatrix<double>& rhs, Substitution part) const = 0;
+  virtual RowMatrix<double> solve(const RowMatrix<double>& rhs, Substitution part,
+                                  Precision precision) const = 0;
 };
 
 /// The error of every factorisation that fails.

@@ -169,38 +169,44 @@ std::optional<HeldSystem> HeldSystem::changed(const Eigen::VectorXi& held) const
   return result;
 }
 
-Points HeldSystem::solve(const Points& rhs, const Points& held_values) const {
+Points HeldSystem::solve(const Points& rhs, const Points* held_values, Precision precision) const {
   const Factored& base = *factored_;
-  RowMatrix<double> load = rhs;
-  if (changes_ == nullptr) {
-    load.noalias() -= base.coupling * held_values;
-    for (const int row : base.held) {
-      load.row(row).setZero();
-    }
-    Points result = base.factor.solve(load);
+  const auto hold = [&](Points& result) {
     for (Eigen::Index i = 0; i < held_.size(); ++i) {
-      result.row(held_[i]) = held_values.row(i);
+      if (held_values != nullptr) {
+        result.row(held_[i]) = held_values->row(i);
+      } else {
+        result.row(held_[i]).setZero();
+      }
     }
+  };
+  RowMatrix<double> load = rhs;
+  RowMatrix<double> kept = RowMatrix<double>::Zero(base.held.size(), 3);
+  if (held_values != nullptr) {
+    for (Eigen::Index i = 0; i < kept.rows(); ++i) {
+      const Eigen::Index from = changes_ == nullptr ? i : changes_->source[i];
+      if (from >= 0) {
+        kept.row(i) = held_values->row(from);
+      }
+    }
+    load.noalias() -= base.coupling * kept;
+  }
+  for (const int row : base.held) {
+    load.row(row).setZero();
+  }
+  if (changes_ == nullptr) {
+    Points result = base.factor.solve(load, precision);
+    hold(result);
     return result;
   }
   const Changes& changes = *changes_;
   const auto added = static_cast<Eigen::Index>(changes.added.size());
   const auto freed = static_cast<Eigen::Index>(changes.freed.size());
-  RowMatrix<double> kept = RowMatrix<double>::Zero(base.held.size(), 3);
-  for (Eigen::Index i = 0; i < kept.rows(); ++i) {
-    if (changes.source[i] >= 0) {
-      kept.row(i) = held_values.row(changes.source[i]);
-    }
-  }
-  load.noalias() -= base.coupling * kept;
-  for (const int row : base.held) {
-    load.row(row).setZero();
-  }
-  RowMatrix<double> half = base.factor.forward(load);
+  RowMatrix<double> half = base.factor.forward(load, precision);
   RowMatrix<double> unknown = -(changes.columns.transpose() * half);
   const RowMatrix<double> between = base.among * kept;
-  for (Eigen::Index i = 0; i < added; ++i) {
-    unknown.row(i) += held_values.row(changes.added[static_cast<size_t>(i)]);
+  for (Eigen::Index i = 0; i < added && held_values != nullptr; ++i) {
+    unknown.row(i) += held_values->row(changes.added[static_cast<size_t>(i)]);
   }
   for (Eigen::Index i = 0; i < freed; ++i) {
     const int place = changes.freed[static_cast<size_t>(i)];
@@ -211,19 +217,25 @@ Points HeldSystem::solve(const Points& rhs, const Points& held_values) const {
     unknown = changes.small.solve(unknown).eval();
   }
   half += changes.columns * unknown;
-  Points result = base.factor.backward(half);
+  Points result = base.factor.backward(half, precision);
   for (Eigen::Index i = 0; i < freed; ++i) {
     result.row(base.held[changes.freed[static_cast<size_t>(i)]]) = unknown.row(added + i);
   }
-  for (Eigen::Index i = 0; i < held_.size(); ++i) {
-    result.row(held_[i]) = held_values.row(i);
-  }
+  hold(result);
   return result;
+}
+
+Points HeldSystem::solve(const Points& rhs, const Points& held_values) const {
+  return solve(rhs, &held_values, Precision::full);
+}
+
+Points HeldSystem::correction(const Points& residual) const {
+  return solve(residual, nullptr, Precision::single);
 }
 
 Points HeldSystem::solve_backward(const Points& grad) const {
   // Its own transpose, where the held rows are 0.
-  return solve(grad, Points::Zero(held_.size(), 3));
+  return solve(grad, nullptr, Precision::full);
 }
 
 FreePoisson::FreePoisson(const SparseMatrix& laplacian, const Eigen::VectorXd& mass,

@@ -131,31 +131,33 @@ void BiharmonicInterpolation::find_kernels(const BiharmonicInterpolation* former
       missing.push_back(points_[i]);
     }
   }
+  // Green's functions of the missing ones, several at once: G = W^-1 with the pins, twice.
+  const Eigen::VectorXd& mass = base_->mass();
+  const Eigen::VectorXi& component = base_->component();
   Eigen::VectorXd total = Eigen::VectorXd::Zero(base_->component_count());
   for (Eigen::Index v = 0; v < n; ++v) {
-    total[base_->component()[v]] += base_->mass()[v];
+    total[component[v]] += mass[v];
   }
   std::vector<RowMatrix<double>> fresh;
-  RowMatrix<double> together;
-  for (size_t first = 0; first < missing.size(); first += kKernelWidth) {
-    const auto left = static_cast<Eigen::Index>(missing.size() - first);
-    const auto offset = static_cast<Eigen::Index>(first) % kTogether;
-    if (offset == 0) {
-      together = base_->factor().solve(units(*base_, missing, first, std::min(kTogether, left)));
-    }
-    const Eigen::Index width = std::min(kKernelWidth, left);
-    RowMatrix<double> block = RowMatrix<double>::Zero(n, kKernelWidth);
-    block.leftCols(width) = together.middleCols(offset, width);
-    RowMatrix<double> mean = RowMatrix<double>::Zero(total.size(), kKernelWidth);
+  for (size_t first = 0; first < missing.size(); first += kTogether) {
+    const auto width =
+        std::min(kTogether, static_cast<Eigen::Index>(missing.size() - first));
+    RowMatrix<double> together = base_->factor().solve(units(*base_, missing, first, width));
+    RowMatrix<double> mean = RowMatrix<double>::Zero(total.size(), width);
     for (Eigen::Index v = 0; v < n; ++v) {
-      mean.row(base_->component()[v]) += base_->mass()[v] * block.row(v);
+      mean.row(component[v]) += mass[v] * together.row(v);
     }
     mean = total.cwiseInverse().asDiagonal() * mean;
     // Zero on the other components, where the solve left it so.
     for (Eigen::Index v = 0; v < n; ++v) {
-      block.row(v) -= mean.row(base_->component()[v]);
+      together.row(v) = mass[v] * (together.row(v) - mean.row(component[v]));
     }
-    fresh.push_back(std::move(block));
+    together = base_->factor().solve(base_->without_pins(std::move(together)));
+    for (Eigen::Index offset = 0; offset < width; offset += kKernelWidth) {
+      const Eigen::Index columns = std::min(kKernelWidth, width - offset);
+      fresh.push_back(RowMatrix<double>::Zero(n, kKernelWidth));
+      fresh.back().leftCols(columns) = together.middleCols(offset, columns);
+    }
   }
 
   // Former blocks are kept where nothing before them was taken out.
@@ -174,7 +176,6 @@ void BiharmonicInterpolation::find_kernels(const BiharmonicInterpolation* former
   };
   const Eigen::Index blocks = (count + kKernelWidth - 1) / kKernelWidth;
   kernels_.resize(static_cast<size_t>(blocks));
-  TallPieces<double> pieces;
   for (Eigen::Index b = 0; b < blocks; ++b) {
     if (kept_block(b)) {
       kernels_[static_cast<size_t>(b)] = former->kernels_[static_cast<size_t>(b)];
@@ -192,30 +193,11 @@ void BiharmonicInterpolation::find_kernels(const BiharmonicInterpolation* former
     kernels_[static_cast<size_t>(b)] = std::move(block);
   }
 
-  // Inner products: those of former pairs are known.
   gram_.resize(count, count);
-  for (const auto& kernel : kernels_) {
-    pieces.emplace_back(*kernel);
-  }
-  for (size_t f = 0; f < fresh.size(); ++f) {
-    const RowMatrix<double> weighted = base_->mass().asDiagonal() * fresh[f];
-    const RowMatrix<double> products = tall_product<double>(pieces, weighted);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const Eigen::Index from = source[static_cast<size_t>(i)];
-      if (from >= 0 || static_cast<size_t>((-1 - from) / kKernelWidth) != f) {
-        continue;
-      }
-      const auto column = products.col((-1 - from) % kKernelWidth).head(count);
-      gram_.col(i) = column;
-      gram_.row(i) = column.transpose();
-    }
-  }
   for (Eigen::Index i = 0; i < count; ++i) {
     for (Eigen::Index j = 0; j < count; ++j) {
-      const Eigen::Index a = source[static_cast<size_t>(i)], b = source[static_cast<size_t>(j)];
-      if (a >= 0 && b >= 0) {
-        gram_(i, j) = former->gram_(a, b);
-      }
+      gram_(i, j) = (*kernels_[static_cast<size_t>(j / kKernelWidth)])(points_[i],
+                                                                       j % kKernelWidth);
     }
   }
 }
@@ -241,13 +223,8 @@ RowMatrix<double> BiharmonicInterpolation::solve(const RowMatrix<double>& values
   for (const auto& kernel : kernels_) {
     pieces.emplace_back(*kernel);
   }
-  RowMatrix<double> load = RowMatrix<double>::Zero(n, c);  // z = M^-1 W x, with W z the forces
-  add_tall_product<double>(1.0, pieces, force, load);
-#pragma omp parallel for schedule(static)
-  for (Eigen::Index v = 0; v < n; ++v) {
-    load.row(v) *= base_->mass()[v];
-  }
-  RowMatrix<double> result = base_->factor().solve(base_->without_pins(std::move(load)));
+  RowMatrix<double> result = RowMatrix<double>::Zero(n, c);
+  add_tall_product<double>(1.0, pieces, force, result);
   RowMatrix<double> offset(base_->component_count(), c);
   for (Eigen::Index i = 0; i < points_.size(); ++i) {
     if (reference_[i] == i) {

@@ -33,7 +33,8 @@ class EigenFactor : public Factor {
   Eigen::Index entries() const override {
     return factor_.matrixL().nestedExpression().nonZeros() + factor_.vectorD().size();
   }
-  RowMatrix<double> solve(const RowMatrix<double>& rhs, Substitution part) const override {
+  RowMatrix<double> solve(const RowMatrix<double>& rhs, Substitution part,
+                          Precision) const override {
     Eigen::MatrixXd x = rhs;
     const Eigen::VectorXd root = factor_.vectorD().cwiseSqrt();
     if (part != Substitution::backward) {
@@ -263,25 +264,25 @@ Eigen::Index SparseCholesky::factor_entries() const {
 
 struct SparseCholesky::Solve {
   static RowMatrix<double> run(const SparseCholesky& cholesky, const RowMatrix<double>& rhs,
-                               Substitution part) {
+                               Substitution part, Precision precision) {
     if (rhs.rows() != cholesky.size()) {
       throw Error(ErrorCode::wrong_shape, "The system has " + std::to_string(cholesky.size()) +
                                               " rows, the right-hand side " +
                                               std::to_string(rhs.rows()) + ".");
     }
     const auto& factor = cholesky.impl_->factor;
-    return factor == nullptr || rhs.cols() == 0 ? rhs : factor->solve(rhs, part);
+    return factor == nullptr || rhs.cols() == 0 ? rhs : factor->solve(rhs, part, precision);
   }
 };
 
-RowMatrix<double> SparseCholesky::solve(const RowMatrix<double>& rhs) const {
-  return Solve::run(*this, rhs, Substitution::both);
+RowMatrix<double> SparseCholesky::solve(const RowMatrix<double>& rhs, Precision precision) const {
+  return Solve::run(*this, rhs, Substitution::both, precision);
 }
-RowMatrix<double> SparseCholesky::forward(const RowMatrix<double>& rhs) const {
-  return Solve::run(*this, rhs, Substitution::forward);
+RowMatrix<double> SparseCholesky::forward(const RowMatrix<double>& rhs, Precision precision) const {
+  return Solve::run(*this, rhs, Substitution::forward, precision);
 }
-RowMatrix<double> SparseCholesky::backward(const RowMatrix<double>& half) const {
-  return Solve::run(*this, half, Substitution::backward);
+RowMatrix<double> SparseCholesky::backward(const RowMatrix<double>& half, Precision precision) const {
+  return Solve::run(*this, half, Substitution::backward, precision);
 }
 
 }  // namespace supple

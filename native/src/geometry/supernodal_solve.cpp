@@ -9,19 +9,30 @@
 namespace supple {
 namespace {
 
+template <class Scalar>
+SUPPLE_INLINE const Scalar* values_of(const SupernodalFactor& factor);
+template <>
+SUPPLE_INLINE const double* values_of(const SupernodalFactor& factor) {
+  return factor.values;
+}
+template <>
+SUPPLE_INLINE const float* values_of(const SupernodalFactor& factor) {
+  return factor.single_values;
+}
+
 // Width right-hand sides: Width / lanes vectors.
-template <int Width, int Bytes>
+template <class Scalar, int Width, int Bytes>
 struct Row {
-  using V = typename Lanes<double, Bytes>::type;
-  static constexpr int kVectors = Width / Lanes<double, Bytes>::count;
+  using V = typename Lanes<Scalar, Bytes>::type;
+  static constexpr int kVectors = Width / Lanes<Scalar, Bytes>::count;
   V part[kVectors];
 
-  SUPPLE_INLINE void add(double factor, const Row& other) {
+  SUPPLE_INLINE void add(Scalar factor, const Row& other) {
     for (int v = 0; v < kVectors; ++v) {
       part[v] += factor * other.part[v];
     }
   }
-  SUPPLE_INLINE void take(double factor, const Row& other) {
+  SUPPLE_INLINE void take(Scalar factor, const Row& other) {
     for (int v = 0; v < kVectors; ++v) {
       part[v] -= factor * other.part[v];
     }
@@ -31,27 +42,27 @@ struct Row {
       part[v] -= other.part[v];
     }
   }
-  SUPPLE_INLINE void scale(double factor) {
+  SUPPLE_INLINE void scale(Scalar factor) {
     for (int v = 0; v < kVectors; ++v) {
       part[v] *= factor;
     }
   }
 };
 
-template <int Width, int Bytes>
-SUPPLE_INLINE void forward(const SupernodalFactor& factor, SupernodeRange range, double* panel) {
-  using R = Row<Width, Bytes>;
+template <class Scalar, int Width, int Bytes>
+SUPPLE_INLINE void forward(const SupernodalFactor& factor, SupernodeRange range, Scalar* panel) {
+  using R = Row<Scalar, Width, Bytes>;
   R* const x = reinterpret_cast<R*>(panel);
   for (int s = range.first; s < range.last; ++s) {
     const int first = factor.super[s], columns = factor.super[s + 1] - first;
     const int* const rows = factor.rows + factor.row_start[s];
     const int height = factor.row_start[s + 1] - factor.row_start[s];
-    const double* const block = factor.values + factor.value_start[s];
+    const Scalar* const block = values_of<Scalar>(factor) + factor.value_start[s];
     const auto column = [&](int j) { return block + static_cast<std::ptrdiff_t>(j) * height; };
     R* const own = x + first;
     for (int j = 0; j < columns; ++j) {
       R value = own[j];
-      value.scale(1.0 / column(j)[j]);
+      value.scale(Scalar(1) / column(j)[j]);
       own[j] = value;
       for (int i = j + 1; i < columns; ++i) {
         own[i].take(column(j)[i], value);
@@ -62,7 +73,7 @@ SUPPLE_INLINE void forward(const SupernodalFactor& factor, SupernodeRange range,
       R a = {}, b = {}, c = {}, d = {};
       for (int j = 0; j < columns; ++j) {
         const R value = own[j];
-        const double* const entry = column(j) + i;
+        const Scalar* const entry = column(j) + i;
         a.add(entry[0], value);
         b.add(entry[1], value);
         c.add(entry[2], value);
@@ -83,21 +94,21 @@ SUPPLE_INLINE void forward(const SupernodalFactor& factor, SupernodeRange range,
   }
 }
 
-template <int Width, int Bytes>
-SUPPLE_INLINE void backward(const SupernodalFactor& factor, SupernodeRange range, double* panel) {
-  using R = Row<Width, Bytes>;
+template <class Scalar, int Width, int Bytes>
+SUPPLE_INLINE void backward(const SupernodalFactor& factor, SupernodeRange range, Scalar* panel) {
+  using R = Row<Scalar, Width, Bytes>;
   R* const x = reinterpret_cast<R*>(panel);
   for (int s = range.last - 1; s >= range.first; --s) {
     const int first = factor.super[s], columns = factor.super[s + 1] - first;
     const int* const rows = factor.rows + factor.row_start[s];
     const int height = factor.row_start[s + 1] - factor.row_start[s];
-    const double* const block = factor.values + factor.value_start[s];
+    const Scalar* const block = values_of<Scalar>(factor) + factor.value_start[s];
     const auto column = [&](int j) { return block + static_cast<std::ptrdiff_t>(j) * height; };
     R* const own = x + first;
     int j = 0;
     for (; j + 4 <= columns; j += 4) {
       R a = {}, b = {}, c = {}, d = {};
-      const double *const la = column(j), *const lb = column(j + 1), *const lc = column(j + 2),
+      const Scalar *const la = column(j), *const lb = column(j + 1), *const lc = column(j + 2),
                           *const ld = column(j + 3);
       for (int i = columns; i < height; ++i) {
         const R value = x[rows[i]];
@@ -123,37 +134,40 @@ SUPPLE_INLINE void backward(const SupernodalFactor& factor, SupernodeRange range
       for (int i = j + 1; i < columns; ++i) {
         value.take(column(j)[i], own[i]);
       }
-      value.scale(1.0 / column(j)[j]);
+      value.scale(Scalar(1) / column(j)[j]);
       own[j] = value;
     }
   }
 }
 
-template <int Width>
+template <class Scalar, int Width>
 struct Kernels {
-  using Function = void (*)(const SupernodalFactor&, SupernodeRange, double*);
-  static constexpr int kWidest = Width < 8 ? 32 : 64;
+  using Function = void (*)(const SupernodalFactor&, SupernodeRange, Scalar*);
+  // No wider than a row of the panel.
+  static constexpr int fitting(int bytes) {
+    return std::min(bytes, Width * static_cast<int>(sizeof(Scalar)));
+  }
   SUPPLE_AVX512 static void forward_avx512(const SupernodalFactor& factor, SupernodeRange range,
-                                           double* panel) {
-    forward<Width, kWidest>(factor, range, panel);
+                                           Scalar* panel) {
+    forward<Scalar, Width, fitting(64)>(factor, range, panel);
   }
   SUPPLE_AVX2 static void forward_avx2(const SupernodalFactor& factor, SupernodeRange range,
-                                       double* panel) {
-    forward<Width, 32>(factor, range, panel);
+                                       Scalar* panel) {
+    forward<Scalar, Width, fitting(32)>(factor, range, panel);
   }
-  static void forward_plain(const SupernodalFactor& factor, SupernodeRange range, double* panel) {
-    forward<Width, 16>(factor, range, panel);
+  static void forward_plain(const SupernodalFactor& factor, SupernodeRange range, Scalar* panel) {
+    forward<Scalar, Width, 16>(factor, range, panel);
   }
   SUPPLE_AVX512 static void backward_avx512(const SupernodalFactor& factor, SupernodeRange range,
-                                            double* panel) {
-    backward<Width, kWidest>(factor, range, panel);
+                                            Scalar* panel) {
+    backward<Scalar, Width, fitting(64)>(factor, range, panel);
   }
   SUPPLE_AVX2 static void backward_avx2(const SupernodalFactor& factor, SupernodeRange range,
-                                        double* panel) {
-    backward<Width, 32>(factor, range, panel);
+                                        Scalar* panel) {
+    backward<Scalar, Width, fitting(32)>(factor, range, panel);
   }
-  static void backward_plain(const SupernodalFactor& factor, SupernodeRange range, double* panel) {
-    backward<Width, 16>(factor, range, panel);
+  static void backward_plain(const SupernodalFactor& factor, SupernodeRange range, Scalar* panel) {
+    backward<Scalar, Width, 16>(factor, range, panel);
   }
   static Function best_forward() {
     static const Function kernel =
@@ -169,20 +183,27 @@ struct Kernels {
 
 }  // namespace
 
-void forward_panel(const SupernodalFactor& factor, SupernodeRange range, double* panel, int width) {
-  const auto kernel = width == 4   ? Kernels<4>::best_forward()
-                      : width == 8 ? Kernels<8>::best_forward()
-                                   : Kernels<16>::best_forward();
+template <class Scalar>
+void forward_panel(const SupernodalFactor& factor, SupernodeRange range, Scalar* panel, int width) {
+  const auto kernel = width == 4   ? Kernels<Scalar, 4>::best_forward()
+                      : width == 8 ? Kernels<Scalar, 8>::best_forward()
+                                   : Kernels<Scalar, 16>::best_forward();
   kernel(factor, range, panel);
 }
 
-void backward_panel(const SupernodalFactor& factor, SupernodeRange range, double* panel,
+template <class Scalar>
+void backward_panel(const SupernodalFactor& factor, SupernodeRange range, Scalar* panel,
                     int width) {
-  const auto kernel = width == 4   ? Kernels<4>::best_backward()
-                      : width == 8 ? Kernels<8>::best_backward()
-                                   : Kernels<16>::best_backward();
+  const auto kernel = width == 4   ? Kernels<Scalar, 4>::best_backward()
+                      : width == 8 ? Kernels<Scalar, 8>::best_backward()
+                                   : Kernels<Scalar, 16>::best_backward();
   kernel(factor, range, panel);
 }
+
+template void forward_panel(const SupernodalFactor&, SupernodeRange, double*, int);
+template void forward_panel(const SupernodalFactor&, SupernodeRange, float*, int);
+template void backward_panel(const SupernodalFactor&, SupernodeRange, double*, int);
+template void backward_panel(const SupernodalFactor&, SupernodeRange, float*, int);
 
 SupernodeParts supernode_parts(const SupernodalFactor& factor, int rows) {
   // Below so many entries a solve takes less time than it takes to wake a thread.

@@ -17,6 +17,7 @@ struct SupernodalFactor {
   const int* value_start = nullptr;
   const int* rows = nullptr;
   const double* values = nullptr;
+  const float* single_values = nullptr;  ///< the same, rounded; needed by panels of float alone
 };
 
 /// Panels as wide as this many right-hand sides are solved for: 4, 8, 16.
@@ -28,11 +29,14 @@ struct SupernodeRange {
 };
 
 /// Forward substitution L X = B over some supernodes, ascending. panel: n x width, row-major,
-/// aligned to 64 bytes, in the factor's order; width: one of kPanelWidths. Each entry of L is read
-/// once for all columns: one column at a time, the reading alone would take longer.
-void forward_panel(const SupernodalFactor& factor, SupernodeRange range, double* panel, int width);
+/// aligned to 64 bytes, in the factor's order, double or float; width: one of kPanelWidths. Each
+/// entry of L is read once for all columns: one column at a time, the reading alone would take
+/// longer.
+template <class Scalar>
+void forward_panel(const SupernodalFactor& factor, SupernodeRange range, Scalar* panel, int width);
 /// Back substitution L^T X = B in the same way, descending.
-void backward_panel(const SupernodalFactor& factor, SupernodeRange range, double* panel, int width);
+template <class Scalar>
+void backward_panel(const SupernodalFactor& factor, SupernodeRange range, Scalar* panel, int width);
 
 /// The elimination tree cut into parts that do not touch each other and a top that all of them lead
 /// to. Made once a factor, the same for any number of threads.

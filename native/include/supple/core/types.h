@@ -22,6 +22,9 @@ using SparseRowMatrix = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 template <class Scalar>
 using RowMatrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+/// The numbers something is calculated with, where there is a choice: double or float.
+enum class Precision { full, single };
+
 /// Face `f` of a field as a 3x3 matrix, writable.
 inline Eigen::Map<Matrix3> matrix_at(MatrixField& field, Eigen::Index f) {
   return Eigen::Map<Matrix3>(field.row(f).data());

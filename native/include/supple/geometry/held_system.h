@@ -34,6 +34,11 @@ class HeldSystem {
   /// rhs: n x 3 (held rows ignored). held_values: one row for each held index, in `held` order.
   /// Returns n x 3 with the held rows exactly as given.
   Points solve(const Points& rhs, const Points& held_values) const;
+  /// What is to be added to an X whose held rows are right where A X is wrong by -residual (n x 3,
+  /// held rows ignored): the solution with held rows 0, in single precision. The error is some 1e-5
+  /// of what is added, whatever X is, so a solve that is taken up again and again, as rounds of an
+  /// edit do, loses nothing and reads half of the memory.
+  Points correction(const Points& residual) const;
   /// Gradient with respect to `rhs` (n x 3, held rows 0) from the gradient with respect to `solve`.
   Points solve_backward(const Points& grad) const;
 
@@ -41,6 +46,8 @@ class HeldSystem {
   struct Factored;
   struct Changes;
   HeldSystem() = default;
+  /// held_values: nullptr for 0.
+  Points solve(const Points& rhs, const Points* held_values, Precision precision) const;
 
   std::shared_ptr<const Factored> factored_;
   std::shared_ptr<const Changes> changes_;  // nullptr: none

@@ -34,8 +34,8 @@ class PinnedLaplacian {
 };
 
 /// The smoothest functions through given values at some vertices: the least integral of (Delta
-/// x)^2, x = M^-1 W x. Source: Botsch and Kobbelt 2004, its kernel form: two Laplace solves, no
-/// bilaplacian is factored.
+/// x)^2, x = M^-1 W x. Source: Botsch and Kobbelt 2004, its kernel form: a point costs two Laplace
+/// solves once, a function through its value then only a product; no bilaplacian is factored.
 class BiharmonicInterpolation {
  public:
   /// points: distinct indices in [0, n), at least one a component. former: of the same base; what
@@ -55,9 +55,9 @@ class BiharmonicInterpolation {
   Eigen::VectorXi points_;
   Eigen::VectorXi reference_;  // per point: the place in points_ of its component's first
   Eigen::VectorXi free_;       // places in points_ that are no reference
-  // n x 8 each: Green's functions of the points, with mean 0 by mass over their component.
+  // n x 8 each: Green's functions of the bilaplacian, G M (G - its mean), one column a point.
   std::vector<std::shared_ptr<const RowMatrix<double>>> kernels_;
-  RowMatrix<double> gram_;  // points x points, their inner products
+  RowMatrix<double> gram_;  // points x points: the kernels at the points
   Eigen::LLT<Eigen::MatrixXd> complement_;
 };
 

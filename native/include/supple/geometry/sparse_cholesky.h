@@ -90,12 +90,18 @@ class SparseCholesky {
   const SymbolicCholesky& symbolic() const;
   /// Entries of the factor, a measure of memory and of the time of a solve.
   Eigen::Index factor_entries() const;
-  /// n x c right-hand sides to n x c solutions; columns are shared among the threads.
-  RowMatrix<double> solve(const RowMatrix<double>& rhs) const;
+  /// n x c right-hand sides to n x c solutions; columns are shared among the threads. In single
+  /// precision the error is some 1e-5 of the solution, and half of the memory is read: for what is
+  /// corrected again later. The factor is made in double precision and rounded when first asked
+  /// for; Eigen's backend stays at double.
+  RowMatrix<double> solve(const RowMatrix<double>& rhs,
+                          Precision precision = Precision::full) const;
   /// The two halves of `solve`, with A = P^T L L^T P: L^-1 P rhs, in the factor's own order of rows
   /// (row i is that of `symbolic().ordering()[i]`), and P^T L^-T of such rows.
-  RowMatrix<double> forward(const RowMatrix<double>& rhs) const;
-  RowMatrix<double> backward(const RowMatrix<double>& half) const;
+  RowMatrix<double> forward(const RowMatrix<double>& rhs,
+                            Precision precision = Precision::full) const;
+  RowMatrix<double> backward(const RowMatrix<double>& half,
+                             Precision precision = Precision::full) const;
 
  private:
   struct Solve;

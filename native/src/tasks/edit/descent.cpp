@@ -38,10 +38,6 @@ void Descent::forget() {
   started_ = converged_ = false;
 }
 
-Points Descent::solved(const Points& gradient) const {
-  return poisson_.solve(gradient, Points::Zero(poisson_.held().size(), 3));
-}
-
 void Descent::pass(Points& moved) {
   const auto hold = [&](Points& gradient) {
     for (const int vertex : poisson_.held()) {
@@ -51,7 +47,7 @@ void Descent::pass(Points& moved) {
   if (!started_) {
     value_ = energy_.evaluate(moved, gradient_);
     hold(gradient_);
-    solved_ = solved(gradient_);
+    solved_ = poisson_.correction(gradient_);
     started_ = true;
   }
   // Two loops (Nocedal 1980); `direction` is kept as what the Laplacian's inverse makes of it, so
@@ -91,7 +87,7 @@ void Descent::pass(Points& moved) {
     }
   }
   hold(next_gradient);
-  Points next_solved = solved(next_gradient);
+  Points next_solved = poisson_.correction(next_gradient);
   Pair pair{next - moved, next_gradient - gradient_, next_solved - solved_, 0.0};
   pair.product = dot(pair.step, pair.change);
   if (pair.product > 1e-12 * pair.step.norm() * pair.change.norm()) {

@@ -30,7 +30,6 @@ class Descent {
     Points step, change, solved;  // s, y, Laplacian^-1 y
     double product;               // s . y
   };
-  Points solved(const Points& gradient) const;
 
   const DeformationEnergy& energy_;
   const HeldSystem& poisson_;

@@ -4,6 +4,7 @@
 
 #include "descent.h"
 #include "handle_checks.h"
+#include "rounds.h"
 #include "suggestion.h"
 #include "supple/core/error.h"
 #include "supple/geometry/jacobians.h"
@@ -75,6 +76,8 @@ struct EditSession::State {
                             const std::vector<std::optional<Matrix3>>& known);
   Points smooth_displacement() const;
   void suggest();
+  /// Adds what the residual of the Poisson equation leaves to be done.
+  void correct(const Points& residual);
   void round(bool use_network);
   void polish_pass();
   void pass();
@@ -214,55 +217,42 @@ Points EditSession::State::smooth_displacement() const {
   return result;
 }
 
+// From the rigid motion, which needs no correction where the handles ask for nothing else.
 void EditSession::State::suggest() {
+  const Points& rest = operators().vertices;
   const MatrixField rotations =
       interpolated_rotations(operators(), *editor->interpolation_, guide_rotations, whole.rotation);
-  moved = editor->poisson_->solve(operators().divergence_of(rotations), held);
+  moved.resize(rest.rows(), 3);
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index v = 0; v < moved.rows(); ++v) {
+    moved.row(v) = whole(rest.row(v));
+  }
+  for (Eigen::Index i = 0; i < held.rows(); ++i) {
+    moved.row(editor->held_[i]) = held.row(i);
+  }
+  correct(towards(operators(), moved, rotations));
+}
+
+void EditSession::State::correct(const Points& residual) {
+  moved += editor->poisson_->correction(residual);
 }
 
 void EditSession::State::round(bool use_network) {
-  Signal signal = rotation_signal(operators().jacobians_of(moved));
   if (!use_network) {
-    moved = editor->poisson_->solve(operators().divergence_of(signal.fields.front()), held);
+    correct(towards_rotations(operators(), moved));
     return;
   }
+  Signal signal;
+  signal.fields.push_back(rotations_of(operators(), moved));
   MatrixField jacobians = editor->network_->forward(*editor->context_, signal);
-  // J = S Q; towards the stiff end less of S, the network's stretch, is kept.
-  const MatrixField rotations = closest_rotations(jacobians);
-  stretch.resize(jacobians.rows(), 9);
-#pragma omp parallel for schedule(static)
-  for (Eigen::Index f = 0; f < jacobians.rows(); ++f) {
-    const auto q = matrix_at(rotations, f);
-    const Matrix3 away = matrix_at(jacobians, f) * q.transpose() - Matrix3::Identity();
-    const double size = away.norm();
-    const double share =
-        (1.0 - options.stiffness) * (size > kMostStretch ? kMostStretch / size : 1.0);
-    const Matrix3 kept = Matrix3::Identity() + share * away;
-    matrix_at(stretch, f) = kept;
-    matrix_at(jacobians, f) = kept * q;
-  }
-  moved = editor->poisson_->solve(operators().divergence_of(jacobians), held);
+  // Towards the stiff end less of the network's stretch is kept.
+  bound_stretch(1.0 - options.stiffness, kMostStretch, jacobians, stretch);
+  correct(towards(operators(), moved, jacobians));
 }
 
-// Towards S Q with the rotation Q that has the least |J - S Q|; S is the identity without a
-// network.
 void EditSession::State::polish_pass() {
-  MatrixField jacobians = operators().jacobians_of(moved);
-  if (stretch.rows() == 0) {
-    jacobians = closest_rotations(jacobians);
-  } else {
-#pragma omp parallel for schedule(static)
-    for (Eigen::Index f = 0; f < jacobians.rows(); ++f) {
-      matrix_at(jacobians, f) =
-          (matrix_at(stretch, f).transpose() * matrix_at(jacobians, f)).eval();
-    }
-    jacobians = closest_rotations(jacobians);
-#pragma omp parallel for schedule(static)
-    for (Eigen::Index f = 0; f < jacobians.rows(); ++f) {
-      matrix_at(jacobians, f) = (matrix_at(stretch, f) * matrix_at(jacobians, f)).eval();
-    }
-  }
-  moved = editor->poisson_->solve(operators().divergence_of(jacobians), held);
+  correct(stretch.rows() == 0 ? towards_rotations(operators(), moved)
+                              : towards_stretched(operators(), moved, stretch));
 }
 
 void EditSession::State::pass() {

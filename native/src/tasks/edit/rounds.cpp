@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "rounds.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+
+#include "supple/geometry/jacobians.h"
+
+namespace supple {
+namespace {
+
+// Faces worked on together: their matrices stay in the first-level cache.
+constexpr Eigen::Index kChunk = 64;
+using Chunk = Eigen::Matrix<double, kChunk, 9, Eigen::RowMajor>;
+
+Eigen::Map<Matrix3> matrix_of(Chunk& chunk, Eigen::Index i) {
+  return Eigen::Map<Matrix3>(chunk.data() + 9 * i);
+}
+
+// visit(first, count): some faces, by one thread.
+template <class Visit>
+void for_each_chunk(Eigen::Index faces, const Visit& visit) {
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index first = 0; first < faces; first += kChunk) {
+    visit(first, std::min(kChunk, faces - first));
+  }
+}
+
+void jacobians_of(const SurfaceOperators& operators, const Points& moved, Eigen::Index first,
+                  Eigen::Index count, Chunk& jacobians) {
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const auto face = operators.faces.row(first + i);
+    const Eigen::RowVector3d origin = moved.row(face[0]);
+    const Eigen::RowVector3d e1 = moved.row(face[1]) - origin, e2 = moved.row(face[2]) - origin;
+    Eigen::RowVector3d normal = e1.cross(e2);
+    const double length = normal.norm();
+    normal *= length > 0.0 ? 1.0 / length : 0.0;
+    const auto inverse = matrix_at(operators.inverse_frames, first + i);
+    matrix_of(jacobians, i).noalias() =
+        inverse.col(0) * e1 + inverse.col(1) * e2 + inverse.col(2) * normal;
+  }
+}
+
+}  // namespace
+
+Points towards(const SurfaceOperators& operators, const Points& moved, const MatrixField& targets) {
+  MatrixField away(targets.rows(), 9);
+  for_each_chunk(away.rows(), [&](Eigen::Index first, Eigen::Index count) {
+    Chunk j;
+    jacobians_of(operators, moved, first, count, j);
+    away.middleRows(first, count) = targets.middleRows(first, count) - j.topRows(count);
+  });
+  return operators.divergence_of(away);
+}
+
+Points towards_rotations(const SurfaceOperators& operators, const Points& moved) {
+  MatrixField away(operators.faces.rows(), 9);
+  for_each_chunk(away.rows(), [&](Eigen::Index first, Eigen::Index count) {
+    Chunk j, q;
+    jacobians_of(operators, moved, first, count, j);
+    closest_rotations(j.data(), q.data(), count, Precision::single);
+    away.middleRows(first, count) = q.topRows(count) - j.topRows(count);
+  });
+  return operators.divergence_of(away);
+}
+
+MatrixField rotations_of(const SurfaceOperators& operators, const Points& moved) {
+  MatrixField rotations(operators.faces.rows(), 9);
+  for_each_chunk(rotations.rows(), [&](Eigen::Index first, Eigen::Index count) {
+    Chunk j;
+    jacobians_of(operators, moved, first, count, j);
+    closest_rotations(j.data(), rotations.row(first).data(), count, Precision::single);
+  });
+  return rotations;
+}
+
+Points towards_stretched(const SurfaceOperators& operators, const Points& moved,
+                         const MatrixField& stretch) {
+  MatrixField away(stretch.rows(), 9);
+  for_each_chunk(away.rows(), [&](Eigen::Index first, Eigen::Index count) {
+    Chunk j, turned, q;
+    jacobians_of(operators, moved, first, count, j);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      matrix_of(turned, i).noalias() =
+          matrix_at(stretch, first + i).transpose() * matrix_of(j, i);
+    }
+    closest_rotations(turned.data(), q.data(), count, Precision::single);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      matrix_at(away, first + i).noalias() =
+          matrix_at(stretch, first + i) * matrix_of(q, i) - matrix_of(j, i);
+    }
+  });
+  return operators.divergence_of(away);
+}
+
+void bound_stretch(double share, double most, MatrixField& predicted, MatrixField& stretch) {
+  stretch.resize(predicted.rows(), 9);
+  for_each_chunk(predicted.rows(), [&](Eigen::Index first, Eigen::Index count) {
+    Chunk q;
+    closest_rotations(predicted.row(first).data(), q.data(), count, Precision::single);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      auto jacobian = matrix_at(predicted, first + i);
+      const Matrix3 away =
+          jacobian * matrix_of(q, i).transpose() - Matrix3::Identity();
+      const double size = away.norm();
+      const Matrix3 kept =
+          Matrix3::Identity() + (share * (size > most ? most / size : 1.0)) * away;
+      matrix_at(stretch, first + i) = kept;
+      jacobian.noalias() = kept * matrix_of(q, i);
+    }
+  });
+}
+
+}  // namespace supple
