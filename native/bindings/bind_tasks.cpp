@@ -14,7 +14,7 @@ using Network = LocalJacobianNetwork<float>;
 
 EditOptions edit_options(const std::string& method, double stiffness, int rounds,
                          int network_rounds, int polish, int passes, bool network,
-                         bool loose_pieces_follow) {
+                         bool loose_pieces_follow, bool keep_volume) {
   const auto set = [](int& option, int value) { option = value < 0 ? option : value; };
   EditOptions options;
   options.method = edit_method(method);
@@ -24,6 +24,7 @@ EditOptions edit_options(const std::string& method, double stiffness, int rounds
   set(options.polish, polish);
   set(options.passes, passes);
   options.network = network;
+  options.keep_volume = keep_volume;
   options.loose_pieces = loose_pieces_follow ? LoosePieces::follow : LoosePieces::stay;
   return options;
 }
@@ -140,14 +141,15 @@ void bind_tasks(py::module_& module) {
   py::class_<EditOptions>(module, "EditOptions")
       .def(py::init(&edit_options), py::arg("method") = "supple", py::arg("stiffness") = 0.0,
            py::arg("rounds") = -1, py::arg("network_rounds") = -1, py::arg("polish") = -1,
-           py::arg("passes") = -1, py::arg("network") = true,
-           py::arg("loose_pieces_follow") = true);
+           py::arg("passes") = -1, py::arg("network") = true, py::arg("loose_pieces_follow") = true,
+           py::arg("keep_volume") = true);
 
   py::class_<EditReport>(module, "EditReport")
       .def_readonly("rounds", &EditReport::rounds)
       .def_readonly("polish", &EditReport::polish)
       .def_readonly("passes", &EditReport::passes)
       .def_readonly("network", &EditReport::network)
+      .def_readonly("volume_kept", &EditReport::volume_kept)
       .def_readonly("suggestion_milliseconds", &EditReport::suggestion_milliseconds)
       .def_readonly("rounds_milliseconds", &EditReport::rounds_milliseconds)
       .def_readonly("passes_milliseconds", &EditReport::passes_milliseconds)

@@ -311,11 +311,14 @@ class EditOptions:
         passes: typing.SupportsInt | typing.SupportsIndex = -1,
         network: bool = True,
         loose_pieces_follow: bool = True,
+        keep_volume: bool = True,
     ) -> None: ...
 
 class EditReport:
     @property
     def network(self) -> bool: ...
+    @property
+    def volume_kept(self) -> bool: ...
     @property
     def passes(self) -> int: ...
     @property

@@ -133,6 +133,7 @@ class Editor:
         passes: int | None = None,
         network: bool = True,
         loose_pieces: str = "follow",
+        keep_volume: bool = True,
         progress: _native.Progress | None = None,
     ) -> EditResult:
         """Pose the mesh; the same result every time. The native work runs without the GIL.
@@ -149,6 +150,8 @@ class Editor:
                 default.
             network: False replaces it by the identity.
             loose_pieces: "follow" or "stay": what components without a handle do.
+            keep_volume: whether closed components whose handles keep their size get back most of
+                the volume that the edit has lost; not of "arap".
             progress: a Progress to watch and cancel.
 
         Raises:
@@ -156,7 +159,16 @@ class Editor:
             Cancelled: if progress was cancelled.
         """
         options = _options(
-            mode, stiffness, method, rounds, network_rounds, polish, passes, network, loose_pieces
+            mode,
+            stiffness,
+            method,
+            rounds,
+            network_rounds,
+            polish,
+            passes,
+            network,
+            loose_pieces,
+            keep_volume,
         )
         targets = self._targets(self.handles if handles is None else handles)
         vertices, report = self._native.solve(targets, options, progress)
@@ -170,9 +182,12 @@ class Editor:
         method: str | None = None,
         network: bool = True,
         loose_pieces: str = "follow",
+        keep_volume: bool = True,
     ) -> "EditSession":
         """An edit that goes on while its targets change; the arguments are those of `solve`."""
-        options = _options(mode, stiffness, method, None, None, None, None, network, loose_pieces)
+        options = _options(
+            mode, stiffness, method, None, None, None, None, network, loose_pieces, keep_volume
+        )
         return EditSession(self, _native.EditSession(self._native, options))
 
     def _targets(self, handles: Sequence[Handle]) -> list[_native.HandleTarget]:
@@ -238,6 +253,7 @@ def _options(
     passes: int | None,
     network: bool,
     loose_pieces: str,
+    keep_volume: bool,
 ) -> _native.EditOptions:
     if mode is not None and mode not in _MODES:
         raise SuppleError("bad_option", f"'{mode}' is no mode. Use 'natural', 'stiff' or 'arap'.")
@@ -263,6 +279,7 @@ def _options(
         **{name: -1 if value is None else value for name, value in counts.items()},
         network=network,
         loose_pieces_follow=loose_pieces == "follow",
+        keep_volume=keep_volume,
     )
 
 
@@ -277,6 +294,7 @@ def _result(
             "polish": report.polish,
             "passes": report.passes,
             "network": report.network,
+            "volume_kept": report.volume_kept,
             "suggestion_milliseconds": report.suggestion_milliseconds,
             "rounds_milliseconds": report.rounds_milliseconds,
             "passes_milliseconds": report.passes_milliseconds,

@@ -133,7 +133,6 @@ class CholmodFactor : public Factor {
     return view;
   }
 
-
   // Where row i of a right-hand side or solution is.
   Eigen::Index place(Eigen::Index i, bool ordered) const {
     return ordered ? i : static_cast<const int*>(factor_->Perm)[i];

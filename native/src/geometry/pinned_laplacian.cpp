@@ -140,8 +140,7 @@ void BiharmonicInterpolation::find_kernels(const BiharmonicInterpolation* former
   }
   std::vector<RowMatrix<double>> fresh;
   for (size_t first = 0; first < missing.size(); first += kTogether) {
-    const auto width =
-        std::min(kTogether, static_cast<Eigen::Index>(missing.size() - first));
+    const auto width = std::min(kTogether, static_cast<Eigen::Index>(missing.size() - first));
     RowMatrix<double> together = base_->factor().solve(units(*base_, missing, first, width));
     RowMatrix<double> mean = RowMatrix<double>::Zero(total.size(), width);
     for (Eigen::Index v = 0; v < n; ++v) {
@@ -196,8 +195,8 @@ void BiharmonicInterpolation::find_kernels(const BiharmonicInterpolation* former
   gram_.resize(count, count);
   for (Eigen::Index i = 0; i < count; ++i) {
     for (Eigen::Index j = 0; j < count; ++j) {
-      gram_(i, j) = (*kernels_[static_cast<size_t>(j / kKernelWidth)])(points_[i],
-                                                                       j % kKernelWidth);
+      gram_(i, j) =
+          (*kernels_[static_cast<size_t>(j / kKernelWidth)])(points_[i], j % kKernelWidth);
     }
   }
 }

@@ -281,7 +281,8 @@ RowMatrix<double> SparseCholesky::solve(const RowMatrix<double>& rhs, Precision 
 RowMatrix<double> SparseCholesky::forward(const RowMatrix<double>& rhs, Precision precision) const {
   return Solve::run(*this, rhs, Substitution::forward, precision);
 }
-RowMatrix<double> SparseCholesky::backward(const RowMatrix<double>& half, Precision precision) const {
+RowMatrix<double> SparseCholesky::backward(const RowMatrix<double>& half,
+                                           Precision precision) const {
   return Solve::run(*this, half, Substitution::backward, precision);
 }
 

@@ -93,7 +93,8 @@ TEST_P(DescentTest, TheFirstArapPassIsALocalGlobalStep) {
   const ArapEnergy energy(operators);
   Points moved = start;
   Descent(energy, *poisson).pass(moved);
-  EXPECT_LT(test::farthest(moved, local_global(operators, *poisson, start, values)), 1e-11);
+  // Of passes, the solve is in single precision.
+  EXPECT_LT(test::farthest(moved, local_global(operators, *poisson, start, values)), 1e-6);
 }
 
 TEST_P(DescentTest, ReachesTheMinimumOfManyLocalGlobalStepsInFew) {

@@ -55,6 +55,9 @@ struct EditOptions {
   /// have converged.
   int passes = 80;
   bool network = true;
+  /// Whether closed components whose handles keep their size get back most of the volume that the
+  /// edit has lost. `supple` only.
+  bool keep_volume = true;
   LoosePieces loose_pieces = LoosePieces::follow;
 };
 
@@ -62,6 +65,7 @@ struct EditOptions {
 struct EditReport {
   int rounds = 0, polish = 0, passes = 0;
   bool network = false;
+  bool volume_kept = false;  ///< whether there was a component to do that for
   double suggestion_milliseconds = 0.0, rounds_milliseconds = 0.0, passes_milliseconds = 0.0,
          total_milliseconds = 0.0;
 };
@@ -72,6 +76,7 @@ struct EditResult {
 };
 
 class EditSession;
+class EnclosedVolume;
 
 /// Handles bound to a prepared mesh, for any targets. Immutable.
 class Editor {
@@ -109,6 +114,7 @@ class Editor {
   Eigen::VectorXi guides_;        // places in held_ whose rotations the suggestion interpolates
   std::shared_ptr<const HeldSystem> poisson_;
   std::shared_ptr<const BiharmonicInterpolation> interpolation_;
+  std::shared_ptr<const EnclosedVolume> volume_;
 };
 
 /// An edit that goes on while its targets change: a drag. Not safe to share between threads.

@@ -6,6 +6,7 @@
 #include "supple/core/error.h"
 #include "supple/geometry/nearest.h"
 #include "supple/tasks/edit.h"
+#include "volume.h"
 
 namespace supple {
 namespace {
@@ -158,6 +159,7 @@ void Editor::bind(const Editor* former, const ProgressRange& progress) {
     poisson_ = std::make_shared<const HeldSystem>(operators.laplacian, held_, prepared_->symbolic);
   }
   progress.report(0.5);
+  volume_ = former == nullptr ? std::make_shared<const EnclosedVolume>(operators) : former->volume_;
   interpolation_ = std::make_shared<const BiharmonicInterpolation>(
       prepared_->pinned(), std::move(points),
       former == nullptr ? nullptr : former->interpolation_.get());

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "supple/geometry/surface_operators.h"
+#include "volume.h"
 
 namespace supple {
 
@@ -33,10 +34,13 @@ class ArapEnergy : public DeformationEnergy {
 
 /// Symmetric Dirichlet (Smith and Schaefer 2015) plus ARAP's resistance to bending: without it a
 /// surface loses strain by crumpling. Faces of less than a tenth of their area, where the first
-/// would go to infinity, get its tangent.
+/// would go to infinity, get its tangent. Closed components also resist a change of volume: a
+/// membrane has the least strain where it gives way to a bend and buckles.
 class StiffEnergy : public DeformationEnergy {
  public:
-  explicit StiffEnergy(const SurfaceOperators& operators);
+  /// volume: not owned; nullptr where none is kept. counts: a component, 0 where its is not.
+  explicit StiffEnergy(const SurfaceOperators& operators, const EnclosedVolume* volume = nullptr,
+                       Eigen::VectorXi counts = {});
   double evaluate(const Points& moved, Points& gradient) const override;
   double stiffness() const override { return 8.0 + 2.0 * kBending; }
   /// Raises the weight of bending around every face that has turned over. Returns how many have.
@@ -46,7 +50,11 @@ class StiffEnergy : public DeformationEnergy {
   static constexpr double kBending = 0.25;
   Eigen::VectorXi turned_over(const Points& points) const;
 
+  double add_volume(const Points& moved, Points& gradient) const;
+
   const SurfaceOperators& operators_;
+  const EnclosedVolume* volume_;
+  Eigen::VectorXi counts_;
   Eigen::VectorXd bending_;       // a face
   Eigen::VectorXi over_at_rest_;  // a face: 1 where it already is
 };

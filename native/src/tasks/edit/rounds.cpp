@@ -2,7 +2,6 @@
 #include "rounds.h"
 
 #include <Eigen/Geometry>
-
 #include <algorithm>
 
 #include "supple/geometry/jacobians.h"
@@ -42,14 +41,29 @@ void jacobians_of(const SurfaceOperators& operators, const Points& moved, Eigen:
   }
 }
 
+// Sets rows of `away` to targets - jacobians. Rotations come in single precision; what differs no
+// more than their rounding counts as reached, so that a rigid motion stays one exactly.
+void difference(const Chunk& targets, const Chunk& jacobians, Eigen::Index first,
+                Eigen::Index count, MatrixField& away) {
+  constexpr double kRounding = 1e-6;
+  for (Eigen::Index i = 0; i < count; ++i) {
+    auto row = away.row(first + i);
+    row = targets.row(i) - jacobians.row(i);
+    if (row.squaredNorm() < kRounding * kRounding) {
+      row.setZero();
+    }
+  }
+}
+
 }  // namespace
 
 Points towards(const SurfaceOperators& operators, const Points& moved, const MatrixField& targets) {
   MatrixField away(targets.rows(), 9);
   for_each_chunk(away.rows(), [&](Eigen::Index first, Eigen::Index count) {
-    Chunk j;
+    Chunk j, target;
     jacobians_of(operators, moved, first, count, j);
-    away.middleRows(first, count) = targets.middleRows(first, count) - j.topRows(count);
+    target.topRows(count) = targets.middleRows(first, count);
+    difference(target, j, first, count, away);
   });
   return operators.divergence_of(away);
 }
@@ -60,7 +74,7 @@ Points towards_rotations(const SurfaceOperators& operators, const Points& moved)
     Chunk j, q;
     jacobians_of(operators, moved, first, count, j);
     closest_rotations(j.data(), q.data(), count, Precision::single);
-    away.middleRows(first, count) = q.topRows(count) - j.topRows(count);
+    difference(q, j, first, count, away);
   });
   return operators.divergence_of(away);
 }
@@ -82,14 +96,13 @@ Points towards_stretched(const SurfaceOperators& operators, const Points& moved,
     Chunk j, turned, q;
     jacobians_of(operators, moved, first, count, j);
     for (Eigen::Index i = 0; i < count; ++i) {
-      matrix_of(turned, i).noalias() =
-          matrix_at(stretch, first + i).transpose() * matrix_of(j, i);
+      matrix_of(turned, i).noalias() = matrix_at(stretch, first + i).transpose() * matrix_of(j, i);
     }
     closest_rotations(turned.data(), q.data(), count, Precision::single);
     for (Eigen::Index i = 0; i < count; ++i) {
-      matrix_at(away, first + i).noalias() =
-          matrix_at(stretch, first + i) * matrix_of(q, i) - matrix_of(j, i);
+      matrix_of(turned, i).noalias() = matrix_at(stretch, first + i) * matrix_of(q, i);
     }
+    difference(turned, j, first, count, away);
   });
   return operators.divergence_of(away);
 }
@@ -101,11 +114,9 @@ void bound_stretch(double share, double most, MatrixField& predicted, MatrixFiel
     closest_rotations(predicted.row(first).data(), q.data(), count, Precision::single);
     for (Eigen::Index i = 0; i < count; ++i) {
       auto jacobian = matrix_at(predicted, first + i);
-      const Matrix3 away =
-          jacobian * matrix_of(q, i).transpose() - Matrix3::Identity();
+      const Matrix3 away = jacobian * matrix_of(q, i).transpose() - Matrix3::Identity();
       const double size = away.norm();
-      const Matrix3 kept =
-          Matrix3::Identity() + (share * (size > most ? most / size : 1.0)) * away;
+      const Matrix3 kept = Matrix3::Identity() + (share * (size > most ? most / size : 1.0)) * away;
       matrix_at(stretch, first + i) = kept;
       jacobian.noalias() = kept * matrix_of(q, i);
     }

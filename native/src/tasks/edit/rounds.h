@@ -20,8 +20,8 @@ MatrixField rotations_of(const SurfaceOperators& operators, const Points& moved)
 Points towards_stretched(const SurfaceOperators& operators, const Points& moved,
                          const MatrixField& stretch);
 
-/// predicted: m x 9 Jacobians P Q; returned with P brought nearer to the identity: of P - I, `share`
-/// is kept and no more than `most` in norm. stretch: m x 9, set to what is left of P.
+/// predicted: m x 9 Jacobians P Q; returned with P brought nearer to the identity: of P - I,
+/// `share` is kept and no more than `most` in norm. stretch: m x 9, set to what is left of P.
 void bound_stretch(double share, double most, MatrixField& predicted, MatrixField& stretch);
 
 }  // namespace supple

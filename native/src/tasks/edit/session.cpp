@@ -9,6 +9,7 @@
 #include "supple/core/error.h"
 #include "supple/geometry/jacobians.h"
 #include "supple/tasks/edit.h"
+#include "volume.h"
 
 namespace supple {
 namespace {
@@ -43,6 +44,12 @@ void check_options(const EditOptions& options) {
   }
 }
 
+// Whether a handle's matrix leaves lengths as they are.
+bool rigid(const Eigen::Matrix4d& matrix) {
+  const Matrix3 linear = matrix.topLeftCorner<3, 3>();
+  return (linear - closest_rotation(linear)).norm() < 1e-3;
+}
+
 Matrix3 row_rotation(const Eigen::Matrix4d& matrix) {
   return closest_rotation(Matrix3(matrix.topLeftCorner<3, 3>().transpose()));
 }
@@ -65,7 +72,7 @@ struct EditSession::State {
 
   const SurfaceOperators& operators() const { return editor->prepared_->operators; }
   /// Steps until there is a pose to show; passes follow.
-  int usable() const { return 1 + options.rounds + polish; }
+  int usable() const { return 1 + options.rounds + polish + (report.volume_kept ? 1 : 0); }
   int step_count() const { return usable() + passes; }
   bool settled() const { return next >= step_count(); }
   void aim(const std::vector<HandleTarget>& targets);
@@ -81,6 +88,7 @@ struct EditSession::State {
   void round(bool use_network);
   void polish_pass();
   void pass();
+  void find_kept_volumes(const std::vector<HandleTarget>& targets);
 
   std::shared_ptr<const Editor> editor;
   EditOptions options;
@@ -92,7 +100,8 @@ struct EditSession::State {
   RigidMotion whole;
   std::vector<Matrix3> guide_rotations;
   Points moved;
-  MatrixField stretch;  // of the last round with the network
+  MatrixField stretch;            // of the last round with the network
+  Eigen::VectorXi volume_counts;  // a component: 1 where its volume is kept
   std::unique_ptr<DeformationEnergy> energy;
   std::unique_ptr<Descent> descent;
   int stiffenings = 0;
@@ -165,7 +174,22 @@ void EditSession::State::aim(const std::vector<HandleTarget>& targets) {
   next = 0;
   report = EditReport{};
   report.network = with_network;
+  find_kept_volumes(targets);
   aimed = true;
+}
+
+void EditSession::State::find_kept_volumes(const std::vector<HandleTarget>& targets) {
+  const Editor& e = *editor;
+  const Eigen::VectorXd& at_rest = e.volume_->at_rest();
+  volume_counts = (at_rest.array() > 0.0).cast<int>();
+  for (Eigen::Index i = 0; i < e.handle_rows_; ++i) {
+    const HandleTarget& target = targets[static_cast<size_t>(e.held_handle_[i])];
+    if (target.matrix && !rigid(*target.matrix)) {
+      volume_counts[operators().component[e.held_[i]]] = 0;
+    }
+  }
+  report.volume_kept = options.keep_volume && options.method == EditMethod::supple &&
+                       (volume_counts.array() != 0).any();
 }
 
 void EditSession::State::find_guide_rotations(const Points& handles_rest,
@@ -259,7 +283,8 @@ void EditSession::State::pass() {
   const bool stiff = options.method == EditMethod::supple;
   if (descent == nullptr) {
     if (stiff) {
-      energy = std::make_unique<StiffEnergy>(operators());
+      energy = std::make_unique<StiffEnergy>(
+          operators(), report.volume_kept ? editor->volume_.get() : nullptr, volume_counts);
     } else {
       energy = std::make_unique<ArapEnergy>(operators());
     }
@@ -289,9 +314,12 @@ void EditSession::State::step() {
     round(with_network && next - 1 + options.network_rounds >= options.rounds);
     ++report.rounds;
     report.rounds_milliseconds += watch.milliseconds();
-  } else if (next < usable()) {
+  } else if (next < first_polish + polish) {
     polish_pass();
     ++report.polish;
+    report.rounds_milliseconds += watch.milliseconds();
+  } else if (next < usable()) {
+    editor->volume_->restore(*editor->poisson_, volume_counts, moved);
     report.rounds_milliseconds += watch.milliseconds();
   } else {
     pass();

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "volume.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace supple {
+namespace {
+
+// Of the lost volume, this much is restored. Bodies and animals that bend lose about half of what
+// an edit without it loses (muscles bulge, but skin also folds), so all of it would be too much.
+constexpr double kShare = 0.7;
+// No vertex goes farther than this, in roots of the area.
+constexpr double kFarthest = 0.05;
+// Less is no volume to keep: a sphere has 0.09.
+constexpr double kLeast = 1e-5;
+
+// How many faces at corner `from` have the edge from -> to in their order.
+int faces_along(const SurfaceOperators& operators, int from, int to) {
+  const CornerTable& corners = operators.corners;
+  int count = 0;
+  for (int i = corners.first[from]; i < corners.first[from + 1]; ++i) {
+    const int f = corners.corner[i] / 3, c = corners.corner[i] - 3 * f;
+    count += operators.faces(f, (c + 1) % 3) == to ? 1 : 0;
+  }
+  return count;
+}
+
+// t with c1 t + c2 t^2 + c3 t^3 = wanted, near 0, |t| <= most.
+double root(double c1, double c2, double c3, double wanted, double most) {
+  double t = 0.0;
+  for (int step = 0; step < 20; ++step) {
+    const double slope = c1 + t * (2.0 * c2 + t * 3.0 * c3);
+    if (!(slope > 0.1 * c1)) {
+      break;  // past where more movement adds volume
+    }
+    const double change = (wanted - t * (c1 + t * (c2 + t * c3))) / slope;
+    t = std::clamp(t + change, -most, most);
+    if (std::abs(change) < 1e-12 * most) {
+      break;
+    }
+  }
+  return t;
+}
+
+}  // namespace
+
+EnclosedVolume::EnclosedVolume(const SurfaceOperators& operators) : operators_(operators) {
+  Eigen::VectorXi open = Eigen::VectorXi::Zero(operators.component_count);
+  for (Eigen::Index f = 0; f < operators.faces.rows(); ++f) {
+    for (int c = 0; c < 3; ++c) {
+      const int a = operators.faces(f, c), b = operators.faces(f, (c + 1) % 3);
+      if (faces_along(operators, a, b) != 1 || faces_along(operators, b, a) != 1) {
+        open[operators.component[a]] = 1;
+      }
+    }
+  }
+  at_rest_ = of(operators.vertices, gradient(operators.vertices));
+  for (Eigen::Index c = 0; c < at_rest_.size(); ++c) {
+    if (open[c] != 0 || !(at_rest_[c] > kLeast)) {
+      at_rest_[c] = 0.0;
+    }
+  }
+}
+
+Eigen::VectorXd EnclosedVolume::of(const Points& moved, const Points& gradient) const {
+  Eigen::VectorXd result = Eigen::VectorXd::Zero(operators_.component_count);
+  for (Eigen::Index v = 0; v < moved.rows(); ++v) {  // of degree 3, so that x . gradient is 3 V
+    result[operators_.component[v]] += moved.row(v).dot(gradient.row(v)) / 3.0;
+  }
+  return result;
+}
+
+Points EnclosedVolume::gradient(const Points& moved) const {
+  const CornerTable& corners = operators_.corners;
+  Points result(moved.rows(), 3);
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index v = 0; v < result.rows(); ++v) {
+    Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+    for (int i = corners.first[v]; i < corners.first[v + 1]; ++i) {
+      const int f = corners.corner[i] / 3, c = corners.corner[i] - 3 * f;
+      const Eigen::RowVector3d next = moved.row(operators_.faces(f, (c + 1) % 3));
+      sum += next.cross(moved.row(operators_.faces(f, (c + 2) % 3)));
+    }
+    result.row(v) = sum / 6.0;
+  }
+  return result;
+}
+
+void EnclosedVolume::restore(const HeldSystem& poisson, const Eigen::VectorXi& counts,
+                             Points& moved) const {
+  const Points slope = gradient(moved);
+  const Points way = poisson.correction(slope);
+  const Points bend = gradient(way);
+  const Eigen::Index pieces = at_rest_.size();
+  // V(moved + t way) = now + first t + second t^2 + third t^3.
+  const Eigen::VectorXd now = of(moved, slope), third = of(way, bend);
+  Eigen::VectorXd first = Eigen::VectorXd::Zero(pieces), second = first, farthest = first;
+  for (Eigen::Index v = 0; v < moved.rows(); ++v) {
+    const int piece = operators_.component[v];
+    first[piece] += slope.row(v).dot(way.row(v));
+    second[piece] += moved.row(v).dot(bend.row(v));
+    farthest[piece] = std::max(farthest[piece], way.row(v).squaredNorm());
+  }
+  Eigen::VectorXd length = Eigen::VectorXd::Zero(pieces);
+  for (Eigen::Index c = 0; c < pieces; ++c) {
+    if (counts[c] != 0 && at_rest_[c] > 0.0 && first[c] > 0.0) {
+      length[c] = root(first[c], second[c], third[c], kShare * (at_rest_[c] - now[c]),
+                       kFarthest / std::sqrt(farthest[c]));
+    }
+  }
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index v = 0; v < moved.rows(); ++v) {
+    moved.row(v) += length[operators_.component[v]] * way.row(v);
+  }
+}
+
+}  // namespace supple
