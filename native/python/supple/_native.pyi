@@ -579,6 +579,7 @@ def transfer_corners(
     corners: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
     tolerance: typing.SupportsFloat | typing.SupportsIndex,
     extrapolate: bool,
+    polygons: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
     otherwise: typing.SupportsFloat | typing.SupportsIndex,
 ) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], int]: ...
 def transfer_field(

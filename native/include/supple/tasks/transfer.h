@@ -70,6 +70,9 @@ struct CornerOptions {
   double tolerance = 1e-6;
   /// Over a seam: true continues the values linearly (UVs), false takes the nearest (colours).
   bool extrapolate = true;
+  /// Target m: triangles of one number are one polygon, which stays on one side of every seam as a
+  /// whole, so that a corner has one value in all of them. Empty: each triangle is its own.
+  Eigen::VectorXi polygons = {};
 };
 /// Values at face corners (source 3 m x c, row 3 f + k is corner k of face f; the target's
 /// likewise): UVs, colours by corner. Each target face takes all its corners from one side of every
