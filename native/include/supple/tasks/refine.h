@@ -29,7 +29,7 @@ struct RefineOptions {
   RefineMethod method = RefineMethod::recovery;
   /// Eigenfunctions of each round, >= 1. A round takes as many as both meshes have where it asks
   /// for more, and never cuts through a multiple eigenvalue.
-  std::vector<int> counts = {80, 100, 120, 128};
+  std::vector<int> counts = {80, 100, 120};
   /// Rounds after them that keep the last Jacobians: the points move, the surface's shape does not.
   int settling_rounds = 0;
   RecoveryOptions recovery;

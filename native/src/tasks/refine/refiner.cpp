@@ -33,6 +33,12 @@ class Stopwatch {
   Clock::time_point start_;
 };
 
+// What a round's number of eigenfunctions makes of the two meshes.
+struct Coarse {
+  Eigen::Index count = 0;
+  Points source, target;  // their vertices in so many eigenfunctions
+};
+
 // The round's state, in surface vertices and units.
 struct State {
   SurfaceMap on;             // ns points on the target
@@ -75,12 +81,20 @@ struct Refiner::Impl {
         target_anchor(refining::surface_anchor(target->mesh)),
         recovery(source->operators, options.recovery,
                  options.recovery.form == RecoveryForm::product ? source->symbolic : nullptr),
-        closest(target->operators.vertices, target->operators.faces) {}
+        closest(target->operators.vertices, target->operators.faces) {
+    const Eigen::Index most = std::min(source->basis.size(), target->basis.size());
+    for (const int wanted : options.counts) {
+      const Eigen::Index count =
+          stable_count(source->basis, target->basis, std::min<Eigen::Index>(wanted, most));
+      rounds.push_back({count, source->basis.project(source->operators.vertices, count),
+                        target->basis.project(target->operators.vertices, count)});
+    }
+  }
 
   RefineResult refine(State state, const ProgressRange& progress) const;
   void spectral_round(State& state, Eigen::Index count, RefineReport& report,
                       const ProgressRange& progress) const;
-  void signal_round(State& state, Eigen::Index count, RefineReport& report) const;
+  void signal_round(State& state, const Coarse& coarse, RefineReport& report) const;
   void place(State& state, RefineReport& report) const;
   RefineResult result_of(const State& state) const;
 
@@ -92,6 +106,7 @@ struct Refiner::Impl {
   Eigen::VectorXi source_anchor, target_anchor;
   EmbeddingRecovery recovery;
   ClosestSurfacePoints closest;
+  std::vector<Coarse> rounds;
 };
 
 void Refiner::Impl::spectral_round(State& state, Eigen::Index count, RefineReport& report,
@@ -105,14 +120,13 @@ void Refiner::Impl::spectral_round(State& state, Eigen::Index count, RefineRepor
   state.moved = surface.vertices(state.vertices, Eigen::all);
 }
 
-void Refiner::Impl::signal_round(State& state, Eigen::Index count, RefineReport& report) const {
+void Refiner::Impl::signal_round(State& state, const Coarse& coarse, RefineReport& report) const {
   Signal signal;
   {
     const Stopwatch watch(report.signal_milliseconds);
-    const Points smooth = target->basis.project(target->operators.vertices, count);
-    const Points coarse =
-        source->basis.project(apply(state.on, target->operators.faces, smooth), count);
-    signal = spectral_signal(source->operators, source->basis, coarse, count);
+    const Points pulled = apply(state.on, target->operators.faces, coarse.target);
+    signal = spectral_signal(source->operators, coarse.source,
+                             Points(source->basis.project(pulled, coarse.count)));
   }
   const Stopwatch watch(report.network_milliseconds);
   state.jacobians =
@@ -140,23 +154,20 @@ RefineResult Refiner::Impl::refine(State state, const ProgressRange& progress) c
     const int settling = spectral ? 0 : options.settling_rounds;
     report.network = network != nullptr && !spectral;
     report.rounds = static_cast<int>(options.counts.size()) + settling;
-    const Eigen::Index most = std::min(source->basis.size(), target->basis.size());
     for (int round = 0; round < report.rounds; ++round) {
       const ProgressRange part = progress.stage(
           "round " + std::to_string(round + 1) + " of " + std::to_string(report.rounds),
           static_cast<double>(round) / report.rounds,
           static_cast<double>(round + 1) / report.rounds);
       part.report(0.0);
-      if (static_cast<size_t>(round) < options.counts.size()) {
-        const Eigen::Index wanted =
-            std::min<Eigen::Index>(options.counts[static_cast<size_t>(round)], most);
-        const Eigen::Index count = stable_count(source->basis, target->basis, wanted);
-        report.eigenfunctions = static_cast<int>(count);
+      if (static_cast<size_t>(round) < rounds.size()) {
+        const Coarse& coarse = rounds[static_cast<size_t>(round)];
+        report.eigenfunctions = static_cast<int>(coarse.count);
         if (spectral) {
-          spectral_round(state, count, report, part);
+          spectral_round(state, coarse.count, report, part);
           continue;
         }
-        signal_round(state, count, report);
+        signal_round(state, coarse, report);
       }
       part.report(0.7);
       place(state, report);
