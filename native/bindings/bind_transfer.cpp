@@ -69,14 +69,14 @@ void bind_transfer(py::module_& module) {
       "transfer_corners",
       [](const SurfaceMap& map, const Points& vertices, const Faces& faces,
          const Faces& target_faces, const RowMatrix<double>& corners, double tolerance,
-         bool extrapolate, double otherwise) {
+         bool extrapolate, const Eigen::VectorXi& polygons, double otherwise) {
         TransferredField result = transfer_corners(map, {vertices, faces}, target_faces, corners,
-                                                   {tolerance, extrapolate}, otherwise);
+                                                   {tolerance, extrapolate, polygons}, otherwise);
         return std::make_pair(std::move(result.values), result.unmapped);
       },
       py::arg("map"), py::arg("vertices"), py::arg("faces"), py::arg("target_faces"),
-      py::arg("corners"), py::arg("tolerance"), py::arg("extrapolate"), py::arg("otherwise"),
-      NoGil());
+      py::arg("corners"), py::arg("tolerance"), py::arg("extrapolate"), py::arg("polygons"),
+      py::arg("otherwise"), NoGil());
 
   module.def(
       "transfer_shape_keys",

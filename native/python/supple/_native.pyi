@@ -32,11 +32,14 @@ __all__: list[str] = [
     "RefineResult",
     "Refiner",
     "SparseCholesky",
+    "SurfaceMap",
     "TrainOptions",
     "TrainingPair",
     "TriangleMesh",
     "blas_name",
     "blend",
+    "check_surface_map",
+    "closest_points",
     "closest_rotations",
     "cotan_laplacian",
     "deform",
@@ -49,18 +52,29 @@ __all__: list[str] = [
     "functional_map",
     "gradient",
     "jacobians",
+    "load_map",
     "lumped_mass",
+    "nearest_corners",
     "nearest_rows",
     "network_forward",
     "network_gradient",
     "point_map",
     "pose_error",
+    "reversed_map",
+    "save_map",
     "set_thread_count",
+    "shrink_fit",
     "simd_level",
+    "surface_map",
     "symmetric_dirichlet",
     "thread_count",
     "train",
     "train_double",
+    "transfer_corners",
+    "transfer_field",
+    "transfer_groups",
+    "transfer_shape_keys",
+    "within_islands",
     "zoomout",
 ]
 
@@ -112,6 +126,17 @@ class TriangleMesh:
     ) -> None: ...
     @property
     def notes(self) -> list[Note]: ...
+
+class SurfaceMap:
+    def __init__(
+        self,
+        face: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    ) -> None: ...
+    @property
+    def face(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
+    @property
+    def weights(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
 
 class SparseCholesky:
     def __init__(
@@ -371,15 +396,23 @@ def blend(
     strength: typing.SupportsFloat | typing.SupportsIndex,
     weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
-def falloff_weights(
-    prepared: PreparedMesh,
-    vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
-    radius: typing.SupportsFloat | typing.SupportsIndex,
-) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
-def farthest_points(
+def check_surface_map(
+    map: SurfaceMap,
+    size: typing.SupportsInt | typing.SupportsIndex,
+    target_faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+) -> None: ...
+def closest_points(
+    vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
     points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
-    count: typing.SupportsInt | typing.SupportsIndex,
-) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
+    normals: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"] | None,
+    cos_limit: typing.SupportsFloat | typing.SupportsIndex,
+    reach: typing.SupportsFloat | typing.SupportsIndex,
+) -> tuple[
+    SurfaceMap,
+    typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"],
+    typing.Annotated[numpy.typing.NDArray[numpy.bool], "[m, 1]"],
+]: ...
 def closest_rotations(
     jacobians: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 9]"],
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]: ...
@@ -414,6 +447,15 @@ def face_distortion(
     faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
     posed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+def falloff_weights(
+    prepared: PreparedMesh,
+    vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+    radius: typing.SupportsFloat | typing.SupportsIndex,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+def farthest_points(
+    points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    count: typing.SupportsInt | typing.SupportsIndex,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
 def flipped_faces(
     rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
     faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
@@ -435,10 +477,21 @@ def jacobians(
     faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
     moved: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]: ...
+def load_map(
+    path: os.PathLike | str | bytes,
+    source_vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    source_faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    target_vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    target_faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+) -> SurfaceMap: ...
 def lumped_mass(
     vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
     faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+def nearest_corners(
+    map: SurfaceMap,
+    target_faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
 def nearest_rows(
     queries: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
     points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
@@ -469,8 +522,43 @@ def pose_error(
     posed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
     truth: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
 ) -> float: ...
+def reversed_map(
+    map: SurfaceMap,
+    from_vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    from_faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    to_vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    to_faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+) -> SurfaceMap: ...
+def save_map(
+    path: os.PathLike | str | bytes,
+    map: SurfaceMap,
+    source_vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    source_faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    target_vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    target_faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+) -> None: ...
 def set_thread_count(count: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+def shrink_fit(
+    source_vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    source_faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    target_vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    target_faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    map: SurfaceMap,
+    rounds: typing.SupportsInt | typing.SupportsIndex = 4,
+    project: bool = True,
+    progress: Progress = None,
+) -> tuple[
+    typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"],
+    typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"],
+    int,
+    int,
+]: ...
 def simd_level() -> str: ...
+def surface_map(
+    point_map: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+    target_faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    target_vertices: typing.SupportsInt | typing.SupportsIndex,
+) -> SurfaceMap: ...
 def symmetric_dirichlet(
     rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
     faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
@@ -491,6 +579,50 @@ def train_double(
     on_step: typing.Any = None,
     progress: Progress = None,
 ) -> dict: ...
+def transfer_corners(
+    map: SurfaceMap,
+    vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    target_faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    corners: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    tolerance: typing.SupportsFloat | typing.SupportsIndex,
+    extrapolate: bool,
+    polygons: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+    otherwise: typing.SupportsFloat | typing.SupportsIndex,
+) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], int]: ...
+def transfer_field(
+    map: SurfaceMap,
+    source_faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    field: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    otherwise: typing.SupportsFloat | typing.SupportsIndex,
+) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], int]: ...
+def transfer_groups(
+    map: SurfaceMap,
+    vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    target_faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    smallest: typing.SupportsFloat | typing.SupportsIndex,
+    majority: typing.SupportsFloat | typing.SupportsIndex,
+) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], bool, int, int]: ...
+def transfer_shape_keys(
+    source_vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    source_faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    keys: collections.abc.Sequence[
+        typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]
+    ],
+    target_vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    target_faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    map: SurfaceMap,
+    progress: Progress = None,
+) -> tuple[list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]], bool, int]: ...
+def within_islands(
+    map: SurfaceMap,
+    vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    target_faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    majority: typing.SupportsFloat | typing.SupportsIndex,
+) -> tuple[SurfaceMap, int, int]: ...
 def zoomout(
     source: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
     source_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],

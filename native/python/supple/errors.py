@@ -8,8 +8,8 @@ class SuppleError(ValueError):
     Attributes:
         code: what went wrong, for programs: "empty_mesh", "wrong_shape", "index_out_of_range",
             "not_finite", "empty_handle", "overlapping_handles", "no_handles", "singular_matrix",
-            "stale_mesh", "model_file", "bad_option", "not_positive_definite", "no_convergence",
-            "cancelled".
+            "stale_mesh", "model_file", "array_file", "bad_option", "not_positive_definite",
+            "no_convergence", "cancelled".
     """
 
     def __init__(self, code: str, message: str) -> None:

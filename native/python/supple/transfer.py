@@ -253,6 +253,7 @@ def transfer_corners(
     *,
     extrapolate: bool = False,
     tolerance: float = 1e-6,
+    polygons: ArrayLike | None = None,
     otherwise: float = 0.0,
 ) -> FieldTransfer:
     """Values at face corners (m, 3, c) of the source, at the target's: colours by corner, UVs.
@@ -262,6 +263,8 @@ def transfer_corners(
 
     Args:
         extrapolate: over a seam, continue the values (UVs) instead of taking the nearest (colours).
+        polygons: (m,) of the target: triangles of one number are one polygon, and a corner has one
+            value in all of them; None where each triangle is its own.
 
     Raises:
         SuppleError: wrong_shape, not_finite, index_out_of_range, bad_option.
@@ -280,16 +283,22 @@ def transfer_corners(
         np.ascontiguousarray(values.reshape(-1, count)),
         float(tolerance),
         bool(extrapolate),
+        np.zeros(0, np.int32) if polygons is None else arrays.indices(polygons, "polygons"),
         float(otherwise),
     )
     return FieldTransfer(result.reshape(-1, 3, count), unmapped)
 
 
 def transfer_uvs(
-    map: SurfaceMap, source: AnyMesh, target: AnyMesh, uvs: ArrayLike
+    map: SurfaceMap,
+    source: AnyMesh,
+    target: AnyMesh,
+    uvs: ArrayLike,
+    *,
+    polygons: ArrayLike | None = None,
 ) -> FieldTransfer:
     """UVs (m, 3, 2) by face corner: transfer_corners, continued over seams."""
-    return transfer_corners(map, source, target, uvs, extrapolate=True)
+    return transfer_corners(map, source, target, uvs, extrapolate=True, polygons=polygons)
 
 
 def transfer_shape_keys(

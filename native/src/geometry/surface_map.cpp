@@ -14,7 +14,7 @@ bool has_three_corners(const Faces& faces, Eigen::Index f) {
 }
 
 [[noreturn]] void fail(ErrorCode code, Eigen::Index i, const std::string& what) {
-  throw Error(code, "Source point " + std::to_string(i) + " of the map " + what);
+  throw Error(code, "Point " + std::to_string(i) + " of the map " + what);
 }
 
 }  // namespace
@@ -24,13 +24,13 @@ void check_surface_map(const SurfaceMap& map, Eigen::Index size, const Faces& ta
     throw Error(ErrorCode::wrong_shape, "The map has " + std::to_string(map.face.size()) +
                                             " faces and " + std::to_string(map.weights.rows()) +
                                             " rows of weights for " + std::to_string(size) +
-                                            " source points; it was made for another mesh.");
+                                            " points; it was made for another mesh.");
   }
   for (Eigen::Index i = 0; i < size; ++i) {
     const int f = map.face[i];
     if (f < -1 || f >= target_faces.rows()) {
       fail(ErrorCode::index_out_of_range, i,
-           "goes to face " + std::to_string(f) + ", but the target has " +
+           "goes to face " + std::to_string(f) + ", but the mesh it maps to has " +
                std::to_string(target_faces.rows()) + " faces, counted from 0.");
     }
     if (f < 0) {
@@ -57,7 +57,7 @@ SurfaceMap surface_map(const Eigen::VectorXi& point_map, const Faces& target_fac
         if (vertex < 0 || vertex >= target_vertices) {
           throw Error(ErrorCode::index_out_of_range,
                       "Face " + std::to_string(f) + " names vertex " + std::to_string(vertex) +
-                          ", but the target has " + std::to_string(target_vertices) +
+                          ", but the mesh it maps to has " + std::to_string(target_vertices) +
                           " vertices, counted from 0.");
         }
         if (corner[vertex] < 0 && has_three_corners(target_faces, f) == three) {
@@ -72,7 +72,7 @@ SurfaceMap surface_map(const Eigen::VectorXi& point_map, const Faces& target_fac
     const int vertex = point_map[i];
     if (vertex < -1 || vertex >= target_vertices) {
       fail(ErrorCode::index_out_of_range, i,
-           "goes to vertex " + std::to_string(vertex) + ", but the target has " +
+           "goes to vertex " + std::to_string(vertex) + ", but the mesh it maps to has " +
                std::to_string(target_vertices) + " vertices, counted from 0.");
     }
     if (vertex >= 0 && corner[vertex] >= 0) {
@@ -113,10 +113,10 @@ void check_pull_back(const SurfaceMap& map, const Faces& target_faces, Eigen::In
     if (corners.minCoeff() < 0 || corners.maxCoeff() >= field_rows) {
       throw Error(
           ErrorCode::index_out_of_range,
-          "Face " + std::to_string(map.face[i]) + " of the target names vertex " +
+          "Face " + std::to_string(map.face[i]) + " of the mesh mapped to names vertex " +
               std::to_string(corners.minCoeff() < 0 ? corners.minCoeff() : corners.maxCoeff()) +
               ", but the field has " + std::to_string(field_rows) +
-              " rows; it needs one for each target vertex.");
+              " rows; it needs one for each vertex of that mesh.");
     }
   }
 }

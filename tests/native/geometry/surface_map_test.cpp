@@ -23,7 +23,7 @@ TEST(SurfaceMap, AVertexIsACornerOfItsLowestFace) {
   EXPECT_EQ(map.face, (Eigen::VectorXi(7) << 1, 2, -1, -1, 3, 1, 1).finished());
   check_surface_map(map, 7, faces);
   EXPECT_EQ(nearest_corners(map, faces), (Eigen::VectorXi(7) << 2, 3, -1, -1, 5, 0, 1).finished());
-  EXPECT_TRUE(fails_with(ErrorCode::index_out_of_range, {"point 1", "vertex 9", "6 vertices"},
+  EXPECT_TRUE(fails_with(ErrorCode::index_out_of_range, {"Point 1", "vertex 9", "6 vertices"},
                          [&] { surface_map(Eigen::Vector2i(0, 9), faces, 6); }));
   EXPECT_TRUE(fails_with(ErrorCode::index_out_of_range, {"Face 3", "vertex 5"},
                          [&] { surface_map(wanted, faces, 5); }));
@@ -80,20 +80,20 @@ TEST(SurfaceMap, SaysWhatIsWrong) {
     return map;
   };
   EXPECT_NO_THROW(check_surface_map(with(-1, 0.25), 3, faces));
-  EXPECT_TRUE(fails_with(ErrorCode::wrong_shape, {"3 faces", "4 source points"},
+  EXPECT_TRUE(fails_with(ErrorCode::wrong_shape, {"3 faces", "4 points"},
                          [&] { check_surface_map(with(-1, 0.25), 4, faces); }));
-  EXPECT_TRUE(fails_with(ErrorCode::index_out_of_range, {"point 2", "face 1", "1 faces"},
+  EXPECT_TRUE(fails_with(ErrorCode::index_out_of_range, {"Point 2", "face 1", "1 faces"},
                          [&] { check_surface_map(with(1, 0.25), 3, faces); }));
-  EXPECT_TRUE(fails_with(ErrorCode::index_out_of_range, {"point 2", "face -2"},
+  EXPECT_TRUE(fails_with(ErrorCode::index_out_of_range, {"Point 2", "face -2"},
                          [&] { check_surface_map(with(-2, 0.25), 3, faces); }));
-  EXPECT_TRUE(fails_with(ErrorCode::bad_option, {"point 1", "sum"},
+  EXPECT_TRUE(fails_with(ErrorCode::bad_option, {"Point 1", "sum"},
                          [&] { check_surface_map(with(-1, 0.3), 3, faces); }));
-  EXPECT_TRUE(fails_with(ErrorCode::not_finite, {"point 1"}, [&] {
+  EXPECT_TRUE(fails_with(ErrorCode::not_finite, {"Point 1"}, [&] {
     check_surface_map(with(-1, std::numeric_limits<double>::quiet_NaN()), 3, faces);
   }));
   SurfaceMap negative = with(-1, 0.25);
   negative.weights.row(1) << 1.5, -0.5, 0.0;
-  EXPECT_TRUE(fails_with(ErrorCode::bad_option, {"point 1", "below 0"},
+  EXPECT_TRUE(fails_with(ErrorCode::bad_option, {"Point 1", "below 0"},
                          [&] { check_surface_map(negative, 3, faces); }));
 }
 

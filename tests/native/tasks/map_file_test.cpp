@@ -83,7 +83,7 @@ TEST_F(MapFile, NoFileAndNoFolder) {
 
 TEST_F(MapFile, AMapOfOtherMeshesIsNotWritten) {
   std::swap(source_, target_);
-  EXPECT_TRUE(fails_with(ErrorCode::wrong_shape, {"source points"}, [&] { save(); }));
+  EXPECT_TRUE(fails_with(ErrorCode::wrong_shape, {"points; it was made"}, [&] { save(); }));
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 

@@ -101,7 +101,7 @@ TEST(ShrinkFit, SaysWhatIsWrong) {
   };
   EXPECT_TRUE(fails_with(ErrorCode::bad_option, {"1 round"}, with({.rounds = 0})));
   EXPECT_TRUE(fails_with(ErrorCode::bad_option, {"growth"}, with({.growth = 0.5})));
-  EXPECT_TRUE(fails_with(ErrorCode::wrong_shape, {"source points"},
+  EXPECT_TRUE(fails_with(ErrorCode::wrong_shape, {"points; it was made"},
                          [&] { shrink_fit(view(fit.target), view(fit.source), fit.map); }));
 }
 

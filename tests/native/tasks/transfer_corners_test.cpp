@@ -98,6 +98,34 @@ TEST(TransferCorners, TurnedCylindersCrossTheSeamInTheirFaces) {
   expect_unwrapped(zoo::open_cylinder(40, 12), target, cylinder_uv, 0.01);
 }
 
+TEST(TransferCorners, APolygonsTrianglesAgreeAtTheirCorners) {
+  const zoo::Mesh source = zoo::torus(48, 24), target = zoo::torus(37, 31);
+  CornerOptions options;
+  options.polygons.resize(target.faces.rows());
+  for (Eigen::Index f = 0; f < target.faces.rows(); ++f) {
+    options.polygons[f] = static_cast<int>(f / 2);  // two triangles after each other are a quad
+  }
+  const auto disagreements = [&](const CornerOptions& with) {
+    const RowMatrix<double> uvs =
+        transfer_corners(closest(source, target.vertices), {source.vertices, source.faces},
+                         target.faces, corner_uvs(source, torus_uv), with)
+            .values;
+    int count = 0;
+    for (Eigen::Index f = 0; f + 1 < target.faces.rows(); f += 2) {
+      for (int i = 0; i < 9; ++i) {
+        const int c = i / 3, d = i % 3;
+        count += target.faces(f, c) == target.faces(f + 1, d) &&
+                 (uvs.row(3 * f + c) - uvs.row(3 * f + 3 + d)).norm() > 1e-9;
+      }
+    }
+    return count;
+  };
+  EXPECT_GT(disagreements({}), 0);
+  EXPECT_EQ(disagreements(options), 0);
+  options.polygons.conservativeResize(5);
+  EXPECT_TRUE(fails_with(ErrorCode::wrong_shape, {"5 faces"}, [&] { disagreements(options); }));
+}
+
 // Six charts far apart in the atlas, one a side.
 RowMatrix<double> side_uvs(const zoo::Mesh& cube) {
   RowMatrix<double> uvs(3 * cube.faces.rows(), 2);

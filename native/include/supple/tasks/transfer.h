@@ -70,6 +70,9 @@ struct CornerOptions {
   double tolerance = 1e-6;
   /// Over a seam: true continues the values linearly (UVs), false takes the nearest (colours).
   bool extrapolate = true;
+  /// Target m: triangles of one number are one polygon, which stays on one side of every seam as a
+  /// whole, so that a corner has one value in all of them. Empty: each triangle is its own.
+  Eigen::VectorXi polygons = {};
 };
 /// Values at face corners (source 3 m x c, row 3 f + k is corner k of face f; the target's
 /// likewise): UVs, colours by corner. Each target face takes all its corners from one side of every
@@ -93,12 +96,12 @@ struct TransferredShapes {
 /// Shape keys: source vertices moved (each n x 3), to the target's vertices moved in the same way.
 /// The source's Jacobians, averaged to its vertices, are interpolated along the map and turned into
 /// the target's frames, and integrated with positions that hold them: a field smooth over the
-/// source's faces. Vertices whose partner, with all around it, is exactly at rest stay exactly at
-/// rest. An unmapped vertex moves with the nearest mapped one.
-/// Source: Sumner and Popovic 2004, "Deformation Transfer for Triangle Meshes"; positions by the
-/// product form of `EmbeddingRecovery`.
-/// Errors: those of `TriangleMesh` and `check_surface_map`; `wrong_shape` or `not_finite` for a
-/// key; `bad_option` where no vertex is mapped; `cancelled`.
+/// source's faces. Where the shapes coincide, the smoothest correction then takes it through the
+/// source's own vertices. Vertices whose partner, with all around it, is exactly at rest stay
+/// exactly at rest. An unmapped vertex moves with the nearest mapped one. Source: Sumner and
+/// Popovic 2004, "Deformation Transfer for Triangle Meshes"; positions by the product form of
+/// `EmbeddingRecovery`. Errors: those of `TriangleMesh` and `check_surface_map`; `wrong_shape` or
+/// `not_finite` for a key; `bad_option` where no vertex is mapped; `cancelled`.
 TransferredShapes transfer_shape_keys(const MeshView& source, const std::vector<Points>& keys,
                                       const MeshView& target, const SurfaceMap& map,
                                       ProgressRange progress = {});

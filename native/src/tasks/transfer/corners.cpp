@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -199,7 +200,30 @@ class Region {
   int round_ = -1;
 };
 
-// Where the search for each target face's side of the seams begins.
+// Target faces that stay on one side of every seam together: the triangles of a polygon.
+using Polygons = std::vector<std::vector<int>>;
+
+Polygons polygons_of(const Eigen::VectorXi& labels, Eigen::Index faces) {
+  if (labels.size() != 0 && labels.size() != faces) {
+    throw Error(ErrorCode::wrong_shape, "There are polygons for " + std::to_string(labels.size()) +
+                                            " faces; the target has " + std::to_string(faces) +
+                                            ".");
+  }
+  std::vector<int> order(faces);
+  std::iota(order.begin(), order.end(), 0);
+  const auto label = [&](int f) { return labels.size() == 0 ? f : labels[f]; };
+  std::stable_sort(order.begin(), order.end(), [&](int f, int g) { return label(f) < label(g); });
+  Polygons result;
+  for (size_t i = 0; i < order.size(); ++i) {
+    if (i == 0 || label(order[i]) != label(order[i - 1])) {
+      result.emplace_back();
+    }
+    result.back().push_back(order[i]);
+  }
+  return result;
+}
+
+// Where the search for each polygon's side of the seams begins.
 struct Centres {
   Points points;
   Eigen::VectorXi face;
@@ -209,47 +233,53 @@ struct Centres {
 // On which side of a thin source a target face lies, its triangle of partners says: unless the map
 // is a mirror image, which most of them together say.
 Centres centres_of(const SurfaceMap& map, const MeshView& source, const Faces& target_faces,
-                   const Points& partners) {
-  const Eigen::Index count = target_faces.rows();
+                   const Polygons& polygons, const Points& partners) {
+  const auto count = static_cast<Eigen::Index>(polygons.size());
   Centres centres{Points::Zero(count, 3), {}, Eigen::VectorXd::Zero(count)};
   Points facing = Points::Zero(count, 3);
-  for (Eigen::Index f = 0; f < count; ++f) {
+  for (Eigen::Index p = 0; p < count; ++p) {
     int mapped = 0;
-    for (int c = 0; c < 3; ++c) {
-      if (map.face[target_faces(f, c)] >= 0) {
-        centres.points.row(f) += partners.row(target_faces(f, c));
-        ++mapped;
+    for (const int f : polygons[p]) {
+      int of_face = 0;
+      for (const int v : target_faces.row(f)) {
+        if (map.face[v] >= 0) {
+          centres.points.row(p) += partners.row(v);
+          ++of_face;
+        }
+      }
+      mapped += of_face;
+      if (of_face == 3) {
+        const Vector a = partners.row(target_faces(f, 0));
+        facing.row(p) += (partners.row(target_faces(f, 1)) - a)
+                             .cross(Vector(partners.row(target_faces(f, 2)) - a));
       }
     }
-    centres.points.row(f) /= std::max(1, mapped);
-    for (int c = 0; c < 3; ++c) {
-      if (map.face[target_faces(f, c)] >= 0) {
-        const Vector out = partners.row(target_faces(f, c)) - centres.points.row(f);
-        centres.radius_squared[f] = std::max(centres.radius_squared[f], out.squaredNorm());
+    centres.points.row(p) /= std::max(1, mapped);
+    for (const int f : polygons[p]) {
+      for (const int v : target_faces.row(f)) {
+        if (map.face[v] >= 0) {
+          const Vector out = partners.row(v) - centres.points.row(p);
+          centres.radius_squared[p] = std::max(centres.radius_squared[p], out.squaredNorm());
+        }
       }
-    }
-    if (mapped == 3) {
-      const Vector a = partners.row(target_faces(f, 0));
-      facing.row(f) = (partners.row(target_faces(f, 1)) - a)
-                          .cross(Vector(partners.row(target_faces(f, 2)) - a));
     }
   }
   const ClosestSurfacePoints surface(source.vertices, source.faces);
   const auto nearest = surface.query(centres.points);
   const Points normals = face_normals(source.vertices, source.faces);
   double same = 0.0;
-  for (Eigen::Index f = 0; f < count; ++f) {
-    same += facing.row(f).dot(normals.row(nearest.map.face[f]));
+  for (Eigen::Index p = 0; p < count; ++p) {
+    same += facing.row(p).dot(normals.row(nearest.map.face[p]));
   }
-  for (Eigen::Index f = 0; f < count; ++f) {
-    const double length = facing.row(f).norm();
-    facing.row(f) *= length > 0.0 ? (same < 0.0 ? -1.0 : 1.0) / length : 0.0;
+  for (Eigen::Index p = 0; p < count; ++p) {
+    const double length = facing.row(p).norm();
+    facing.row(p) *= length > 0.0 ? (same < 0.0 ? -1.0 : 1.0) / length : 0.0;
   }
   const auto agreeing = surface.query(centres.points, facing, kAgree);
   centres.face = nearest.map.face;
-  for (Eigen::Index f = 0; f < count; ++f) {
-    if (agreeing.squared_distance[f] <= centres.radius_squared[f]) {
-      centres.face[f] = agreeing.map.face[f];
+  for (Eigen::Index p = 0; p < count; ++p) {
+    if (agreeing.squared_distance[p] <= centres.radius_squared[p]) {
+      centres.face[p] = agreeing.map.face[p];
     }
   }
   return centres;
@@ -264,7 +294,8 @@ TransferredField transfer_corners(const SurfaceMap& map, const MeshView& source,
   check_faces(target_faces, map.size(), "target");
   check_corners(corners, source.faces, options);
   const Points partners = apply(map, source.faces, source.vertices);
-  const Centres centres = centres_of(map, source, target_faces, partners);
+  const Polygons polygons = polygons_of(options.polygons, target_faces.rows());
+  const Centres centres = centres_of(map, source, target_faces, polygons, partners);
   const Continuations continuations(source.faces, corners, options.tolerance);
   const Source side{source, continuations, corners, options.extrapolate};
   TransferredField result{RowMatrix<double>(3 * target_faces.rows(), corners.cols()),
@@ -273,15 +304,17 @@ TransferredField transfer_corners(const SurfaceMap& map, const MeshView& source,
   {
     Region region(side);
 #pragma omp for schedule(dynamic, 64)
-    for (Eigen::Index f = 0; f < target_faces.rows(); ++f) {
-      region.grow(centres.face[f], centres.points.row(f), centres.radius_squared[f]);
-      for (int c = 0; c < 3; ++c) {
-        const int v = target_faces(f, c);
-        if (map.face[v] < 0) {
-          result.values.row(3 * f + c).setConstant(otherwise);
-        } else {
-          result.values.row(3 * f + c) =
-              region.value(map.face[v], map.weights.row(v), partners.row(v));
+    for (Eigen::Index p = 0; p < centres.face.size(); ++p) {
+      region.grow(centres.face[p], centres.points.row(p), centres.radius_squared[p]);
+      for (const int f : polygons[p]) {
+        for (int c = 0; c < 3; ++c) {
+          const int v = target_faces(f, c);
+          const Eigen::Index row = 3 * Eigen::Index{f} + c;
+          if (map.face[v] < 0) {
+            result.values.row(row).setConstant(otherwise);
+          } else {
+            result.values.row(row) = region.value(map.face[v], map.weights.row(v), partners.row(v));
+          }
         }
       }
     }

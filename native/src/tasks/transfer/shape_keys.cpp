@@ -1,22 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <Eigen/Geometry>
-#include <Eigen/LU>
 #include <cmath>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "supple/core/error.h"
-#include "supple/geometry/jacobians.h"
 #include "supple/geometry/mesh.h"
-#include "supple/geometry/nearest.h"
 #include "supple/geometry/operators.h"
 #include "supple/geometry/sparse_cholesky.h"
 #include "supple/geometry/surface_operators.h"
 #include "supple/spectral/recovery.h"
 #include "supple/tasks/transfer.h"
 #include "tasks/transfer/islands.h"
+#include "tasks/transfer/shape_parts.h"
 
 namespace supple {
 namespace {
@@ -30,131 +27,11 @@ constexpr double kPullInPlace = 20.0;
 // where the key hardly moves. Elsewhere the Jacobians decide: a longer arm swings farther.
 constexpr double kPullInFrames = 60.0;
 constexpr double kHardlyMoves = 0.02;  // of the largest displacement
-// Frames are averaged over a thirtieth of the surface.
-constexpr double kFramePull = 1000.0;
 // Share of the pull that keeps the system definite where nothing is known.
 constexpr double kLeast = 1e-4;
 
-struct Similarity {
-  double scale = 1.0;
-  Matrix3 rotation = Matrix3::Identity();
-  Vector offset = Vector::Zero();
-
-  Points operator()(const Points& p) const { return (scale * p * rotation).rowwise() + offset; }
-};
-
-// The least mass-weighted |similarity(from) - to|^2. Source: Umeyama 1991.
-Similarity fitted(const Points& from, const Points& to, const Eigen::VectorXd& mass) {
-  const Vector from_centre = mass.transpose() * from / mass.sum();
-  const Vector to_centre = mass.transpose() * to / mass.sum();
-  const Points a = from.rowwise() - from_centre, b = to.rowwise() - to_centre;
-  const Matrix3 covariance = a.transpose() * mass.asDiagonal() * b;
-  Similarity result;
-  result.rotation = closest_rotation(covariance);
-  const double size = mass.dot(a.rowwise().squaredNorm());
-  result.scale = size > 0.0 ? (result.rotation.transpose() * covariance).trace() / size : 1.0;
-  result.offset = to_centre - result.scale * from_centre * result.rotation;
-  return result;
-}
-
 double rms(const Points& a, const Points& b, const Eigen::VectorXd& mass) {
   return std::sqrt(mass.dot((a - b).rowwise().squaredNorm()) / mass.sum());
-}
-
-// The source's side: displacements and Jacobians at its vertices.
-class SourceShape {
- public:
-  explicit SourceShape(const MeshView& view) : mesh(view.vertices, view.faces) {
-    const Faces& faces = mesh.faces();
-    Faces surface(mesh.mesh_face().size(), 3);
-    for (Eigen::Index i = 0; i < surface.rows(); ++i) {
-      surface.row(i) = faces.row(mesh.mesh_face()[i]);
-    }
-    surface_faces_ = std::move(surface);
-    inverse_ = inverse_frames(face_frames(mesh.vertices(), surface_faces_));
-    average_ =
-        average_faces_to_vertices(surface_faces_, mesh.vertices().rows(), AveragingWeights::area,
-                                  face_areas(mesh.vertices(), surface_faces_));
-  }
-
-  // n x 9, J - 1 of each vertex. An average of averages is smoother than the faces' own; one step
-  // of correction gives back most of what it loses.
-  MatrixField vertex_strains(const Points& moved) const {
-    MatrixField strain = jacobians(inverse_, moved, surface_faces_);
-    const Eigen::Map<const Eigen::Matrix<double, 1, 9>> one(kIdentity.data());
-    strain.rowwise() -= one;
-    MatrixField at_vertices = average_ * strain;
-    const MatrixField lost =
-        strain - MatrixField(average_vertices_to_faces<double>(surface_faces_, at_vertices));
-    at_vertices += average_ * lost;
-    return at_vertices;
-  }
-
-  TriangleMesh mesh;
-
- private:
-  static inline const Matrix3 kIdentity = Matrix3::Identity();
-  Faces surface_faces_;
-  MatrixField inverse_;
-  SparseRowMatrix average_;
-};
-
-// The map of the target's surface vertices; those without a partner have their nearest one's.
-struct SurfacePartners {
-  SurfaceMap map;
-  std::vector<bool> known;
-};
-
-SurfacePartners partners_of(const TriangleMesh& target, const SurfaceMap& map) {
-  const Eigen::Index n = target.mesh_vertex().size();
-  SurfacePartners result{{Eigen::VectorXi(n), Points(n, 3)}, std::vector<bool>(n)};
-  std::vector<int> known;
-  for (int i = 0; i < n; ++i) {
-    result.known[i] = map.face[target.mesh_vertex()[i]] >= 0;
-    if (result.known[i]) {
-      known.push_back(i);
-    }
-  }
-  if (known.empty()) {
-    throw Error(ErrorCode::bad_option,
-                "The map gives no vertex of the target's surface a partner; there is nothing to "
-                "carry over.");
-  }
-  Points places(static_cast<Eigen::Index>(known.size()), 3);
-  for (size_t i = 0; i < known.size(); ++i) {
-    places.row(static_cast<Eigen::Index>(i)) = target.surface_vertices().row(known[i]);
-  }
-  std::optional<NearestPoints> nearest;
-  for (int i = 0; i < n; ++i) {
-    int from = i;
-    if (!result.known[i]) {
-      if (!nearest) {
-        nearest.emplace(places);
-      }
-      from = known[nearest->query(target.surface_vertices().row(i)).index[0]];
-    }
-    const int vertex = target.mesh_vertex()[from];
-    result.map.face[i] = map.face[vertex];
-    result.map.weights.row(i) = map.weights.row(vertex);
-  }
-  return result;
-}
-
-// n x 9 rotations from the target's directions at each vertex to the source's there.
-MatrixField frames_along(const SurfaceOperators& target, const Points& partners,
-                         const std::shared_ptr<const SymbolicCholesky>& symbolic) {
-  // Where the map collapses a face its rows are 0 and it has no say.
-  const MatrixField along = jacobians(target.inverse_frames, face_frames(partners, target.faces));
-  const RowMatrix<double> at_vertices =
-      average_faces_to_vertices(target.faces, target.vertices.rows(), AveragingWeights::area,
-                                target.face_areas) *
-      along;
-  const Eigen::VectorXd mass = kFramePull * target.mass / target.mass.sum();
-  SparseMatrix system = target.laplacian;
-  for (Eigen::Index i = 0; i < system.rows(); ++i) {
-    system.coeffRef(i, i) += mass[i];
-  }
-  return closest_rotations(SparseCholesky(system, symbolic).solve(mass.asDiagonal() * at_vertices));
 }
 
 class ShapeTransfer {
@@ -183,6 +60,11 @@ class ShapeTransfer {
     if (coincide_) {
       const double areas = target_mesh_.scale() / (in_place_.scale * source_.mesh.scale());
       prepare_in_place(kPullInPlace * static_cast<double>(rest.rows()) * areas * areas);
+      const Points placed = target_mesh_.to_surface(in_place_(rest));
+      const Points partners = target_mesh_.to_surface(in_place_(there));
+      correction_ = std::make_unique<const AnchoredCorrection>(
+          target_, anchors_of(placed, source.faces, target_, partners, partners_.known,
+                              edge * in_place_.scale / target_mesh_.scale()));
       ahead_ = here;
     } else {
       in_place_.scale = target_mesh_.scale() / source_.mesh.scale();
@@ -224,7 +106,9 @@ class ShapeTransfer {
   Points ahead_;         // where the source's motion is read off: target vertices or partners
   MatrixField frames_;   // empty in place
   Eigen::VectorXd confidence_;
-  std::unique_ptr<const EmbeddingRecovery> recovery_;  // in place: one for all keys
+  // In place: one for all keys.
+  std::unique_ptr<const EmbeddingRecovery> recovery_;
+  std::unique_ptr<const AnchoredCorrection> correction_;
 };
 
 // Each corner moves the place as its own motion to first order would; their mean is exact for an
@@ -316,13 +200,22 @@ Points ShapeTransfer::moved(const Points& key) const {
     }
     result = recovery(confidence, kPullInFrames).solve(rest + moves, jacobian);
   }
-  Points displacement = (result - rest) * target_mesh_.scale();
-  for (Eigen::Index i = 0; i < displacement.rows(); ++i) {
-    if (still[i]) {
-      displacement.row(i).setZero();
-      result.row(i) = rest.row(i);
+  Points displacement = result - rest;
+  const auto keep_still = [&] {
+    for (Eigen::Index i = 0; i < displacement.rows(); ++i) {
+      if (still[i]) {
+        displacement.row(i).setZero();
+      }
     }
+  };
+  keep_still();
+  if (coincide_) {
+    // Averaging has smoothed the key's finest detail; the source's own vertices still have it.
+    displacement += (*correction_)(offsets / target_mesh_.scale(), strains, displacement);
+    keep_still();
   }
+  result = rest + displacement;
+  displacement *= target_mesh_.scale();
   // `scatter` moves what is on no face; the others keep their own digits.
   Points vertices = target_mesh_.scatter(result, target_.average * target_.jacobians_of(result));
   for (Eigen::Index i = 0; i < displacement.rows(); ++i) {
