@@ -10,5 +10,6 @@ PYBIND11_MODULE(_native, module) {
   supple::bindings::bind_learning(module);
   supple::bindings::bind_cache(module);
   supple::bindings::bind_tasks(module);
+  supple::bindings::bind_refine(module);
   supple::bindings::bind_transfer(module);
 }

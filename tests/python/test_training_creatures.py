@@ -171,3 +171,17 @@ def test_held_out_creatures_are_never_training_creatures():
     assert all(creatures.is_held_out(traits) for traits in unseen)
     assert creatures.is_held_out(np.array([0.1, 0.9]))
     assert not creatures.is_held_out(np.array([0.1, 0.1]))
+
+
+def test_other_proportions_grow_parts_by_different_factors_and_stay_one_surface(quadruped):
+    other = quadruped.other_proportions(np.random.default_rng(5))
+    assert np.array_equal(other.faces, quadruped.faces)
+    assert len(other.vertices) == len(quadruped.vertices)
+    before, after = (unit_normals(c.vertices, c.faces)[1] for c in (quadruped, other))
+    growth = np.sqrt(after / before)
+    low, high = np.quantile(growth, [0.1, 0.9])
+    assert high / low > 1.2
+    assert growth.max() < 4
+    # Its joints went with the skin: a pose still turns limbs about their own joints.
+    posed = creatures.sample_pose(other, np.random.default_rng(6))
+    assert np.isfinite(posed).all()

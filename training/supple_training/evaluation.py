@@ -12,9 +12,12 @@ from collections.abc import Callable
 
 import numpy as np
 import supple
+from numpy.typing import NDArray
 
 from supple_training.edits import farthest_points, true_handles
+from supple_training.maps import rough_maps
 from supple_training.pairs import Pair
+from supple_training.remesh import unit_normals
 
 HANDLE_COUNTS = (8, 16, 40)
 """How many handles a pose is edited by."""
@@ -47,10 +50,18 @@ def rotation_rows(pairs: list[Pair], model: supple.Model) -> list[Rows]:
     return result
 
 
+def map_error(target: NDArray, faces: NDArray, point_map: NDArray) -> float:
+    """Of a map whose truth is the identity: the mean distance of an image from where it should be,
+    divided by the square root of the target's area, x100."""
+    unit = np.sqrt(unit_normals(target, faces)[1].sum())
+    return float(100 * np.mean(np.linalg.norm(target[point_map] - target, axis=1)) / unit)
+
+
 def spectral_rows(pairs: list[Pair], model: supple.Model) -> list[Rows]:
-    """For each pair: the target recovered from its coordinates in 40 and 80 eigenfunctions."""
+    """For each pair: the target recovered from its coordinates in 40 and 80 eigenfunctions; and the
+    error (`map_error`) of a rough map between the two, refined."""
     result = []
-    for source, faces, target in pairs:
+    for index, (source, faces, target) in enumerate(pairs):
         prepared = supple.PreparedMesh(source, faces, cache=False)
         rows: Rows = {"network": {}, "no_network": {}}
         for count in EIGENFUNCTIONS:
@@ -63,6 +74,13 @@ def spectral_rows(pairs: list[Pair], model: supple.Model) -> list[Rows]:
                     network=name == "network",
                 )
                 row[f"{count} eigenfunctions"] = supple.pose_error(source, faces, recovered, target)
+        rough = rough_maps(pairs[index], np.random.default_rng(index), 1)[1]
+        other = supple.PreparedMesh(target, faces, cache=False)
+        for name, row in rows.items():
+            refined = supple.refine(
+                prepared, other, rough, model=model if name == "network" else None
+            )
+            row["refined map"] = map_error(target, faces, refined.point_map)
         result.append(rows)
     return result
 

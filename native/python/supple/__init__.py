@@ -19,6 +19,7 @@ from .mesh import Mesh, Note, PreparedMesh
 from .metrics import face_distortion, flipped_faces, pose_error, symmetric_dirichlet
 from .model import Model, load_model, shipped_models
 from .parallel import set_thread_count, thread_count
+from .refining import Refiner, RefineResult, refine
 from .transfer import (
     SurfaceMap,
     closest_points,
@@ -46,6 +47,8 @@ __all__ = [
     "PreparedCache",
     "PreparedMesh",
     "Progress",
+    "RefineResult",
+    "Refiner",
     "SuppleError",
     "SurfaceMap",
     "TrainResult",
@@ -63,6 +66,7 @@ __all__ = [
     "load_map",
     "load_model",
     "pose_error",
+    "refine",
     "reversed_map",
     "save_map",
     "set_thread_count",

@@ -27,6 +27,10 @@ __all__: list[str] = [
     "Note",
     "PreparedMesh",
     "Progress",
+    "RefineOptions",
+    "RefineReport",
+    "RefineResult",
+    "Refiner",
     "SparseCholesky",
     "SurfaceMap",
     "TrainOptions",
@@ -256,6 +260,10 @@ class TrainingPair:
         source: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
         faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
         target: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+        suggestions: collections.abc.Sequence[typing.Any] = ...,
+        maps: collections.abc.Sequence[
+            typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"]
+        ] = ...,
     ) -> None: ...
 
 class PreparedCache:
@@ -634,3 +642,74 @@ def zoomout(
 ]: ...
 
 __version__: str
+
+class RefineOptions:
+    def __init__(
+        self,
+        method: str = "recovery",
+        counts: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = ...,
+        settling_rounds: typing.SupportsInt | typing.SupportsIndex = 0,
+        form: str = "product",
+        pull: typing.SupportsFloat | typing.SupportsIndex = 4000.0,
+        point_weight: typing.SupportsFloat | typing.SupportsIndex = 20000.0,
+        jacobian_weight: typing.SupportsFloat | typing.SupportsIndex = 150000.0,
+        facing: typing.SupportsFloat | typing.SupportsIndex = 0.0,
+        facing_reach: typing.SupportsFloat | typing.SupportsIndex = ...,
+        backward: bool = False,
+    ) -> None: ...
+
+class RefineReport:
+    @property
+    def rounds(self) -> int: ...
+    @property
+    def eigenfunctions(self) -> int: ...
+    @property
+    def network(self) -> bool: ...
+    @property
+    def signal_milliseconds(self) -> float: ...
+    @property
+    def network_milliseconds(self) -> float: ...
+    @property
+    def recovery_milliseconds(self) -> float: ...
+    @property
+    def nearest_milliseconds(self) -> float: ...
+    @property
+    def total_milliseconds(self) -> float: ...
+
+class RefineResult:
+    @property
+    def point_map(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
+    @property
+    def surface_map(self) -> SurfaceMap: ...
+    @property
+    def recovered(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @property
+    def confidence(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def backward_point_map(
+        self,
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
+    @property
+    def backward_surface_map(self) -> SurfaceMap: ...
+    @property
+    def report(self) -> RefineReport: ...
+
+class Refiner:
+    def __init__(
+        self,
+        source: PreparedMesh,
+        target: PreparedMesh,
+        network: Network | None,
+        options: RefineOptions,
+        progress: Progress | None = None,
+    ) -> None: ...
+    @typing.overload
+    def refine(
+        self,
+        point_map: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        progress: Progress | None = None,
+    ) -> RefineResult: ...
+    @typing.overload
+    def refine(self, map: SurfaceMap, progress: Progress | None = None) -> RefineResult: ...
+    @property
+    def notes(self) -> list[Note]: ...

@@ -53,8 +53,12 @@ Signal rotation_signal(const MatrixField& suggested) { return {{closest_rotation
 
 Signal spectral_signal(const SurfaceOperators& source, const Eigenbasis& basis,
                        const Points& coarse_target, Eigen::Index count) {
-  const MatrixField from =
-      coarse_frames(basis.project(source.vertices, count), source.faces, source.face_areas);
+  return spectral_signal(source, Points(basis.project(source.vertices, count)), coarse_target);
+}
+
+Signal spectral_signal(const SurfaceOperators& source, const Points& coarse_source,
+                       const Points& coarse_target) {
+  const MatrixField from = coarse_frames(coarse_source, source.faces, source.face_areas);
   const MatrixField to = coarse_frames(coarse_target, source.faces, source.face_areas);
   const Eigen::Index m = source.faces.rows();
   // Edges are short and the normal is not: weigh them alike.

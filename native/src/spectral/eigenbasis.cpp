@@ -14,6 +14,7 @@
 #include "multiresolution.h"
 #include "supple/core/dense.h"
 #include "supple/core/error.h"
+#include "supple/core/tall.h"
 
 namespace supple {
 namespace {
@@ -96,13 +97,13 @@ EigenMethod eigen_method(const std::string& name) {
 RowMatrix<double> Eigenbasis::coefficients(const RowMatrix<double>& field,
                                            Eigen::Index count) const {
   const RowMatrix<double> weighted = mass.asDiagonal() * field;
-  const RowMatrix<double> head = functions.leftCols(count);
-  return product(head, Op::transpose, weighted, Op::none);
+  return tall_product<double>({functions.leftCols(count)}, weighted);
 }
 
 RowMatrix<double> Eigenbasis::expand(const RowMatrix<double>& coefficients) const {
-  const RowMatrix<double> head = functions.leftCols(coefficients.rows());
-  return product(head, coefficients);
+  RowMatrix<double> result = RowMatrix<double>::Zero(functions.rows(), coefficients.cols());
+  add_tall_product<double>(1.0, {functions.leftCols(coefficients.rows())}, coefficients, result);
+  return result;
 }
 
 RowMatrix<double> Eigenbasis::project(const RowMatrix<double>& field, Eigen::Index count) const {

@@ -233,6 +233,29 @@ TEST(TrainingFromSuggestions, DrawsThemAndReducesTheLoss) {
   EXPECT_LT(last, 0.9 * first);
 }
 
+TEST(TrainingAlongMaps, TheTrueMapIsAsNoMap) {
+  TrainOptions options = tiny_options(Configuration::equivariant, SignalKind::spectral);
+  TrainingPair plain = tiny_pairs()[0], mapped = plain, rough = plain;
+  const auto n = static_cast<int>(plain.source.rows());
+  mapped.maps = {Eigen::VectorXi::LinSpaced(n, 0, n - 1)};
+  rough.maps = {Eigen::VectorXi::LinSpaced(n, 0, n - 1).reverse()};
+  const double expected = Trainer<double>({plain}, options).step().loss.total;
+  EXPECT_NEAR(Trainer<double>({mapped}, options).step().loss.total, expected, 1e-9 * expected);
+  EXPECT_GT(Trainer<double>({rough}, options).step().loss.total, 1.1 * expected);
+}
+
+TEST(TrainingAlongMaps, RefusesAMapOfAnotherMesh) {
+  const TrainOptions options = tiny_options(Configuration::equivariant, SignalKind::spectral);
+  std::vector<TrainingPair> pairs = tiny_pairs();
+  const Eigen::Index n = pairs[1].source.rows();
+  pairs[1].maps = {Eigen::VectorXi::Zero(n - 1)};
+  EXPECT_TRUE(test::fails_with(ErrorCode::wrong_shape, {"pair 1"},
+                               [&] { Trainer<float>(pairs, options); }));
+  pairs[1].maps = {Eigen::VectorXi::Constant(n, static_cast<int>(n))};
+  EXPECT_TRUE(test::fails_with(ErrorCode::index_out_of_range, {"pair 1"},
+                               [&] { Trainer<float>(pairs, options); }));
+}
+
 TEST_F(TrainerErrors, Cancelled) {
   Progress progress;
   progress.cancel();

@@ -37,6 +37,9 @@ Signal rotation_signal(const MatrixField& suggested);
 /// what is left of the deformation when both sides have lost their detail.
 Signal spectral_signal(const SurfaceOperators& source, const Eigenbasis& basis,
                        const Points& coarse_target, Eigen::Index count);
+/// The same from the source's own projection, n x 3: basis.project(source.vertices, count).
+Signal spectral_signal(const SurfaceOperators& source, const Points& coarse_source,
+                       const Points& coarse_target);
 
 /// The coarse target of a pair in 1:1 correspondence, the paper's Eqn 10 with the true map:
 /// Phi1 Phi1^+ Phi2 Phi2^+ V2, n x 3.
