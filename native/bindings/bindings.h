@@ -24,5 +24,6 @@ void bind_spectral(py::module_& module);
 void bind_learning(py::module_& module);
 void bind_cache(py::module_& module);
 void bind_tasks(py::module_& module);
+void bind_map_metrics(py::module_& module);
 
 }  // namespace supple::bindings

@@ -10,4 +10,5 @@ PYBIND11_MODULE(_native, module) {
   supple::bindings::bind_learning(module);
   supple::bindings::bind_cache(module);
   supple::bindings::bind_tasks(module);
+  supple::bindings::bind_map_metrics(module);
 }

@@ -15,6 +15,15 @@ from .deforming import deform
 from .editing import Editor, EditResult, EditSession, Handle, edit
 from .errors import Cancelled, SuppleError
 from .learning import TrainResult, train
+from .map_metrics import (
+    Geodesics,
+    chamfer,
+    coverage,
+    face_inversion,
+    geodesic_errors,
+    map_dirichlet,
+    vertex_inversion,
+)
 from .mesh import Mesh, Note, PreparedMesh
 from .metrics import face_distortion, flipped_faces, pose_error, symmetric_dirichlet
 from .model import Model, load_model, shipped_models
@@ -25,6 +34,7 @@ __all__ = [
     "EditResult",
     "EditSession",
     "Editor",
+    "Geodesics",
     "Handle",
     "Mesh",
     "Model",
@@ -38,13 +48,18 @@ __all__ = [
     "blas_name",
     "blend",
     "cache",
+    "chamfer",
+    "coverage",
     "deform",
     "edit",
     "face_distortion",
+    "face_inversion",
     "falloff_weights",
     "farthest_points",
     "flipped_faces",
+    "geodesic_errors",
     "load_model",
+    "map_dirichlet",
     "pose_error",
     "set_thread_count",
     "shipped_models",
@@ -52,4 +67,5 @@ __all__ = [
     "symmetric_dirichlet",
     "thread_count",
     "train",
+    "vertex_inversion",
 ]

@@ -21,6 +21,7 @@ __all__: list[str] = [
     "EditSession",
     "Editor",
     "EmbeddingRecovery",
+    "Geodesics",
     "Handle",
     "HandleTarget",
     "Network",
@@ -33,19 +34,24 @@ __all__: list[str] = [
     "TriangleMesh",
     "blas_name",
     "blend",
+    "chamfer",
     "closest_rotations",
     "cotan_laplacian",
+    "coverage",
     "deform",
     "eigenbasis",
     "face_areas",
     "face_distortion",
+    "face_inversion",
     "falloff_weights",
     "farthest_points",
     "flipped_faces",
     "functional_map",
+    "geodesic_errors",
     "gradient",
     "jacobians",
     "lumped_mass",
+    "map_dirichlet",
     "nearest_rows",
     "network_forward",
     "network_gradient",
@@ -57,6 +63,7 @@ __all__: list[str] = [
     "thread_count",
     "train",
     "train_double",
+    "vertex_inversion",
     "zoomout",
 ]
 
@@ -108,6 +115,22 @@ class TriangleMesh:
     ) -> None: ...
     @property
     def notes(self) -> list[Note]: ...
+
+class Geodesics:
+    def __init__(
+        self,
+        vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+        faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    ) -> None: ...
+    def between(
+        self,
+        sources: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        targets: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, n]"],
+        progress: Progress = None,
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+    def distances(
+        self, source: typing.SupportsInt | typing.SupportsIndex
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
 
 class SparseCholesky:
     def __init__(
@@ -483,6 +506,37 @@ def train_double(
     on_step: typing.Any = None,
     progress: Progress = None,
 ) -> dict: ...
+def coverage(
+    source: TriangleMesh,
+    target: TriangleMesh,
+    map: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+) -> float: ...
+def face_inversion(
+    source: TriangleMesh,
+    target: TriangleMesh,
+    map: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+) -> float: ...
+def map_dirichlet(
+    source: TriangleMesh,
+    target: TriangleMesh,
+    map: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+) -> float: ...
+def vertex_inversion(
+    source: TriangleMesh,
+    target: TriangleMesh,
+    map: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+) -> float: ...
+def chamfer(
+    a: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    b: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+) -> float: ...
+def geodesic_errors(
+    geodesics: Geodesics,
+    area: typing.SupportsFloat | typing.SupportsIndex,
+    truth: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+    images: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, n]"],
+    progress: Progress = None,
+) -> list[tuple[float, int]]: ...
 def zoomout(
     source: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
     source_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
