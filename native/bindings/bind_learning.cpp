@@ -108,11 +108,13 @@ void bind_learning(py::module_& module) {
 
   py::class_<TrainingPair>(module, "TrainingPair")
       .def(py::init([](const Points& source, const Faces& faces, const Points& target,
-                       const std::vector<Suggestion>& suggestions) {
-             return TrainingPair{source, faces, target, suggestions};
+                       const std::vector<Suggestion>& suggestions,
+                       const std::vector<Eigen::VectorXi>& maps) {
+             return TrainingPair{source, faces, target, suggestions, maps};
            }),
            py::arg("source"), py::arg("faces"), py::arg("target"),
-           py::arg("suggestions") = std::vector<Suggestion>());
+           py::arg("suggestions") = std::vector<Suggestion>(),
+           py::arg("maps") = std::vector<Eigen::VectorXi>());
 
   const auto define = [&](const char* name, auto function) {
     module.def(name, function, py::arg("pairs"), py::arg("options"), py::arg("max_steps") = 0,

@@ -11,4 +11,5 @@ PYBIND11_MODULE(_native, module) {
   supple::bindings::bind_cache(module);
   supple::bindings::bind_tasks(module);
   supple::bindings::bind_map_metrics(module);
+  supple::bindings::bind_refine(module);
 }

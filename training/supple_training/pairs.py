@@ -31,7 +31,7 @@ from supple_training.remesh import remesh
 
 Pair = tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64]]
 
-RECIPE = 2
+RECIPE = 3
 """Raise this when the pairs of a seed change, so that cached files are made again."""
 
 
@@ -49,7 +49,7 @@ class PairSettings:
     rest_share: float = 0.4
     """The share of sources at rest."""
     other_body_share: float = 0.2
-    """The share of targets that are another body, among the pairs of bodies."""
+    """The share of targets that are another body, or a creature of other proportions."""
     creature_share: float = 0.5
     """The share of pairs that are creatures instead of human bodies."""
 
@@ -77,8 +77,13 @@ def make_pair(settings: PairSettings, index: int) -> Pair:
     rng = np.random.default_rng([settings.seed, int(settings.held_out), index])
     if rng.random() < settings.creature_share:
         at_rest = bool(rng.random() < settings.rest_share)
+        other = settings.other_body_share > 0 and bool(rng.random() < settings.other_body_share)
         return make_creature_pair(
-            rng, held_out=settings.held_out, at_rest=at_rest, vertices=settings.vertices
+            rng,
+            held_out=settings.held_out,
+            at_rest=at_rest,
+            other_proportions=other,
+            vertices=settings.vertices,
         )
     body = bodies.sample_phenotype(rng, held_out=settings.held_out)
     other = body

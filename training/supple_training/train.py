@@ -28,6 +28,7 @@ from supple_training import pairs as pair_store
 from supple_training.console import DEFAULT_CACHE, console, pairs_with_progress, progress_bar
 from supple_training.edits import suggestions
 from supple_training.evaluation import evaluate
+from supple_training.maps import rough_maps
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -37,6 +38,12 @@ HELD_OUT_SEED = 1_000_000
 
 SUGGESTIONS = 4
 """Edits of each pair that the rotation network is trained on."""
+
+MAPS = 4
+"""Rough maps of each pair, beside the true one, that the spectral network is trained on."""
+
+SIGNAL_EIGENFUNCTIONS = (30, 128)
+"""Fewest and most of the spectral signal; refining uses 80 to 120."""
 
 LOSS_WEIGHTS = {"rotation": (1.0, 10.0, 2.0), "spectral": (1.0, 1000.0, 2.0)}
 """Of the Jacobian, position and integrated terms. Editing has the paper's. Spectral positions
@@ -67,7 +74,7 @@ def pair_settings(signal: str, *, pairs: int, seed: int, held_out: bool) -> pair
         pairs,
         seed + HELD_OUT_SEED if held_out else seed,
         held_out,
-        other_body_share=0.2 if signal == "spectral" else 0.0,
+        other_body_share=0.4 if signal == "spectral" else 0.0,
     )
 
 
@@ -81,6 +88,14 @@ def with_suggestions(pairs: list[pair_store.Pair], seed: int) -> list[tuple]:
             result.append((*pair, suggestions(pair, rng, SUGGESTIONS)))
             bar.advance(task)
     return result
+
+
+def with_maps(pairs: list[pair_store.Pair], seed: int) -> list[tuple]:
+    """The pairs, each with its true map and `MAPS` rough ones."""
+    return [
+        (*pair, rough_maps(pair, np.random.default_rng([seed, index]), MAPS))
+        for index, pair in enumerate(pairs)
+    ]
 
 
 def run_training(pairs: list[tuple], **options) -> tuple[supple.TrainResult, float]:
@@ -212,6 +227,9 @@ def main(
     if signal is Signal.rotation:
         training = with_suggestions(training, seed)
         example = f"one of {SUGGESTIONS} edits of a pair by random handles"
+    else:
+        training = with_maps(training, seed)
+        example = f"one pair along its true map or one of {MAPS} rough ones"
     metadata = {
         "title": f"Supple Local Jacobian Network, {signal.value} signal",
         "training_data": source,
@@ -227,6 +245,7 @@ def main(
         epochs=epochs,
         seed=seed,
         loss_weights=LOSS_WEIGHTS[signal.value],
+        signal_eigenfunctions=SIGNAL_EIGENFUNCTIONS,
         metadata=metadata,
     )
     result.model.save(out)

@@ -39,6 +39,7 @@ def train(
     samples: int | None = None,
     width: int = 256,
     eigenfunctions: int = 128,
+    signal_eigenfunctions: tuple[int, int] = (20, 100),
     learning_rate: tuple[float, float] = (1e-3, 1e-5),
     loss_weights: tuple[float, float, float] = (1.0, 10.0, 2.0),
     metadata: dict[str, str] | None = None,
@@ -50,10 +51,12 @@ def train(
     """Train a Local Jacobian Network on pairs in 1:1 correspondence.
 
     Args:
-        pairs: (source_vertices (n, 3), faces (m, 3), target_vertices (n, 3)) each, any units; for
-            the rotation signal optionally a fourth: a sequence of suggestions (vertices (n, 3),
-            held (k,)), what edits start from and the vertices that are at their targets there. One
-            is drawn each step: the signal is taken from it, the losses hold those vertices.
+        pairs: (source_vertices (n, 3), faces (m, 3), target_vertices (n, 3)) each, any units,
+            optionally with a fourth, of which one is drawn each step. For the rotation signal: a
+            sequence of suggestions (vertices (n, 3), held (k,)), what edits start from and the
+            vertices that are at their targets there; the signal is taken from it, the losses hold
+            those vertices. For the spectral signal: a sequence of rough maps (n,), a target vertex
+            for each source vertex, along which the target is pulled back.
         signal: "rotation" (closest rotations of a suggestion's Jacobians, or without one of the
             true ones) or "spectral" (the target in 20 to 100 eigenfunctions, drawn anew each step).
         config: "equivariant" or "paper".
@@ -62,6 +65,7 @@ def train(
         samples: points of each mesh the layers are evaluated at, 0 for every vertex; None for 1024
             ("equivariant") or 0 ("paper").
         width, eigenfunctions: of the network.
+        signal_eigenfunctions: fewest and most of the spectral signal, drawn anew each step.
         learning_rate: first and last; between them the same factor every step.
         loss_weights: of the Jacobian, position and integrated terms; the paper's by default.
         metadata: added to the model's.
@@ -79,25 +83,12 @@ def train(
     options.epochs = epochs
     options.seed = seed
     options.samples = (0 if config == "paper" else 1024) if samples is None else samples
+    options.fewest_eigenfunctions, options.most_eigenfunctions = signal_eigenfunctions
     options.first_learning_rate, options.last_learning_rate = learning_rate
     options.loss_weights = list(loss_weights)
     run = _native.train_double if double else _native.train
     result = run(
-        [
-            _native.TrainingPair(
-                arrays.points(source, f"pair {i}: source"),
-                arrays.triangles(faces, f"pair {i}: faces"),
-                arrays.points(target, f"pair {i}: target"),
-                [
-                    _native.Suggestion(
-                        arrays.points(vertices, f"pair {i}: suggestion {j}"),
-                        arrays.indices(held, f"pair {i}: held vertices of suggestion {j}"),
-                    )
-                    for j, (vertices, held) in enumerate(suggestions[0] if suggestions else ())
-                ],
-            )
-            for i, (source, faces, target, *suggestions) in enumerate(pairs)
-        ],
+        [_training_pair(i, signal, *pair) for i, pair in enumerate(pairs)],
         options,
         0 if max_steps is None else max_steps,
         callback,
@@ -113,6 +104,35 @@ def train(
         from_tensors(result["tensors"], {**(metadata or {}), **architecture}),
         result["steps"],
         {name: np.array(value) for name, value in result["initial"].items()},
+    )
+
+
+def _training_pair(
+    i: int,
+    signal: str,
+    source: ArrayLike,
+    faces: ArrayLike,
+    target: ArrayLike,
+    variants: Sequence = (),
+) -> _native.TrainingPair:
+    suggestions, maps = [], []
+    for j, variant in enumerate(variants):
+        if signal == "spectral":
+            maps.append(arrays.indices(variant, f"pair {i}: map {j}"))
+            continue
+        vertices, held = variant
+        suggestions.append(
+            _native.Suggestion(
+                arrays.points(vertices, f"pair {i}: suggestion {j}"),
+                arrays.indices(held, f"pair {i}: held vertices of suggestion {j}"),
+            )
+        )
+    return _native.TrainingPair(
+        arrays.points(source, f"pair {i}: source"),
+        arrays.triangles(faces, f"pair {i}: faces"),
+        arrays.points(target, f"pair {i}: target"),
+        suggestions,
+        maps,
     )
 
 

@@ -73,6 +73,11 @@ struct Trainer<Scalar>::Example {
       target_basis = eigenbasis(other.laplacian, other.mass,
                                 {.count = options.most_eigenfunctions + 1}, progress);
     }
+    if (options.architecture.signal == SignalKind::spectral) {
+      for (const Eigen::VectorXi& map : pair.maps) {
+        add(map, index);
+      }
+    }
     context = std::make_unique<NetworkContext<Scalar>>(
         operators, basis, options.architecture.eigenfunctions, options.samples);
     if (options.architecture.signal == SignalKind::rotation) {
@@ -120,6 +125,39 @@ struct Trainer<Scalar>::Example {
          HeldSystem(operators.laplacian, Eigen::Map<Eigen::VectorXi>(held.data(), count))});
   }
 
+  void add(const Eigen::VectorXi& map, int index) {
+    const Eigen::Index n = mesh.vertices().rows();
+    if (map.size() != n) {
+      throw Error(ErrorCode::wrong_shape, "A map of pair " + std::to_string(index) + " has " +
+                                              std::to_string(map.size()) + " entries for " +
+                                              std::to_string(n) + " source vertices.");
+    }
+    Eigen::VectorXi on_surface(operators.vertices.rows());
+    for (Eigen::Index i = 0; i < on_surface.size(); ++i) {
+      const int vertex = map[mesh.mesh_vertex()[i]];
+      if (vertex < 0 || vertex >= n || mesh.surface_vertex()[vertex] < 0) {
+        throw Error(ErrorCode::index_out_of_range,
+                    "A map of pair " + std::to_string(index) + " leads to vertex " +
+                        std::to_string(vertex) + ", which is no vertex of the target's surface.");
+      }
+      on_surface[i] = mesh.surface_vertex()[vertex];
+    }
+    maps.push_back(std::move(on_surface));
+  }
+
+  /// The number of suggestions or maps, whichever the signal has.
+  size_t variants() const { return std::max(suggestions.size(), maps.size()); }
+
+  /// The target in `count` eigenfunctions, pulled back along the true map or one of the rough ones.
+  Points coarse_target(Eigen::Index count, int map) const {
+    if (map < 0) {
+      return spectral_target(basis, target_basis, target, count);
+    }
+    const Points smooth = target_basis.project(target, count);
+    const Points pulled = smooth(maps[static_cast<size_t>(map)], Eigen::all);
+    return basis.project(pulled, count);
+  }
+
   /// What there is of `wanted` eigenfunctions of the spectral signal; 0 for rotations.
   int signal_count(int wanted) const {
     return target_basis.size() == 0 ? 0
@@ -138,6 +176,7 @@ struct Trainer<Scalar>::Example {
   std::unique_ptr<FreePoisson> poisson;
   std::unique_ptr<NetworkContext<Scalar>> context;
   std::vector<Edit> suggestions;
+  std::vector<Eigen::VectorXi> maps;  // of surface vertices
 };
 
 template <class Scalar>
@@ -177,8 +216,7 @@ Signal Trainer<Scalar>::signal_of(const Example& example, int eigenfunctions,
         suggestion < 0 ? example.target
                        : example.suggestions[static_cast<size_t>(suggestion)].moved));
   }
-  const Points coarse =
-      spectral_target(example.basis, example.target_basis, example.target, eigenfunctions);
+  const Points coarse = example.coarse_target(eigenfunctions, suggestion);
   return spectral_signal(example.operators, example.basis, coarse, eigenfunctions);
 }
 
@@ -192,7 +230,7 @@ void Trainer<Scalar>::normalise_inputs() {
   for (const auto& example : examples_) {
     const int middle = (options_.fewest_eigenfunctions + options_.most_eigenfunctions) / 2;
     const Signal signal =
-        signal_of(*example, example->signal_count(middle), example->suggestions.empty() ? -1 : 0);
+        signal_of(*example, example->signal_count(middle), example->variants() == 0 ? -1 : 0);
     const RowMatrix<double> raw =
         network_.raw_inputs(*example->context, signal).template cast<double>();
     sum += raw.colwise().sum();
@@ -226,15 +264,15 @@ TrainStep Trainer<Scalar>::step() {
     result.eigenfunctions =
         example.signal_count(options_.fewest_eigenfunctions + draw(generator_, range));
   }
-  if (!example.suggestions.empty()) {
-    result.suggestion = draw(generator_, static_cast<int>(example.suggestions.size()));
+  if (example.variants() > 0) {
+    result.suggestion = draw(generator_, static_cast<int>(example.variants()));
   }
 
   const Signal signal = signal_of(example, result.eigenfunctions, result.suggestion);
   typename LocalJacobianNetwork<Scalar>::Trace trace;
   const MatrixField predicted = network_.forward(*example.context, signal, &trace);
   MatrixField grad;
-  if (result.suggestion < 0) {
+  if (example.suggestions.empty()) {
     result.loss = supervised_loss(example.operators, *example.poisson, options_.weights,
                                   example.target, predicted, &grad);
   } else {

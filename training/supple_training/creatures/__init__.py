@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from supple_training.bodies import HELD_OUT_GRID, self_intersection
 from supple_training.creatures.families import FAMILIES
 from supple_training.creatures.poses import follow, joint_motions, sample_turns, stand
+from supple_training.creatures.proportions import grown
 from supple_training.creatures.skeleton import FloatArray, Skeleton
 from supple_training.creatures.skin import IntArray, skin, spread
 from supple_training.remesh import (
@@ -41,6 +42,11 @@ class Creature:
     """(m, 3): one closed manifold surface, counterclockwise from outside."""
     weights: FloatArray
     """(n, joints): how far each vertex follows each joint; rows sum to 1."""
+
+    def other_proportions(self, rng: np.random.Generator) -> Creature:
+        """The same creature with longer and shorter, thicker and thinner parts."""
+        skeleton, vertices = grown(self.skeleton, self.vertices, self.weights, rng)
+        return Creature(skeleton, vertices, self.faces, self.weights)
 
     def posed(self, turns: FloatArray) -> FloatArray:
         """The skin (n, 3) after turns (joints, 3) in degrees about the joints' own axes."""
@@ -149,12 +155,14 @@ def make_creature_pair(
     *,
     held_out: bool = False,
     at_rest: bool = False,
+    other_proportions: bool = False,
     vertices: tuple[int, int] = (3500, 6500),
     family: str | None = None,
 ) -> tuple[FloatArray, NDArray[np.int32], FloatArray]:
     """A pair of a new creature: source (n, 3), faces (m, 3), target (n, 3).
 
-    The source is at rest or posed, triangulated in its own way; the target is another pose.
+    The source is at rest or posed, triangulated in its own way; the target is another pose, of
+    other proportions where they are asked for.
 
     Raises RuntimeError when no good creature, triangulation or pose is found.
     """
@@ -162,7 +170,9 @@ def make_creature_pair(
         try:
             creature = sample_creature(rng, held_out=held_out, vertices=vertices, family=family)
             source = creature.vertices if at_rest else sample_pose(creature, rng)
-            target = sample_pose(creature, rng)
+            target = sample_pose(
+                creature.other_proportions(rng) if other_proportions else creature, rng
+            )
             break
         except RuntimeError:
             if not left:

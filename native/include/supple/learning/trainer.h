@@ -27,6 +27,10 @@ struct TrainingPair {
   /// For the rotation signal: what it is taken from, one drawn each step, and then the losses hold
   /// its vertices. Without any, the signal is taken from the target itself, as in the paper.
   std::vector<Suggestion> suggestions = {};
+  /// For the spectral signal: rough maps, one target vertex for each of the n source vertices. One
+  /// is drawn each step and the target pulled back along it, as refining does; what is asked for
+  /// stays the true target. Without any, along the true map, as in the paper.
+  std::vector<Eigen::VectorXi> maps = {};
 };
 
 struct TrainOptions {
@@ -48,7 +52,7 @@ struct TrainStep {
   int step = 0;
   int pair = 0;
   int eigenfunctions = 0;  ///< of the spectral signal; 0 for rotations
-  int suggestion = -1;     ///< which of the pair's; -1 for the target itself
+  int suggestion = -1;     ///< which of the pair's suggestions or maps; -1 for the target itself
   double learning_rate = 0.0;
   LossValues loss;
 };
