@@ -25,6 +25,7 @@ void bind_learning(py::module_& module);
 void bind_cache(py::module_& module);
 void bind_tasks(py::module_& module);
 void bind_map_metrics(py::module_& module);
+void bind_initial_maps(py::module_& module);
 void bind_refine(py::module_& module);
 
 }  // namespace supple::bindings
