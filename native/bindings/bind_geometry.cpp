@@ -7,6 +7,7 @@
 #include "supple/geometry/mesh.h"
 #include "supple/geometry/operators.h"
 #include "supple/geometry/sparse_cholesky.h"
+#include "supple/geometry/surface_map.h"
 
 namespace supple::bindings {
 namespace {
@@ -38,6 +39,19 @@ void bind_geometry(py::module_& module) {
   py::class_<TriangleMesh>(module, "TriangleMesh")
       .def(py::init<Points, Faces>(), py::arg("vertices"), py::arg("faces"))
       .def_property_readonly("notes", &TriangleMesh::notes);
+
+  py::class_<SurfaceMap>(module, "SurfaceMap")
+      .def(py::init([](Eigen::VectorXi face, Points weights) {
+             return SurfaceMap{std::move(face), std::move(weights)};
+           }),
+           py::arg("face"), py::arg("weights"))
+      .def_readonly("face", &SurfaceMap::face)
+      .def_readonly("weights", &SurfaceMap::weights);
+  module.def("check_surface_map", &check_surface_map, py::arg("map"), py::arg("size"),
+             py::arg("target_faces"), NoGil());
+  module.def("surface_map", &surface_map, py::arg("point_map"), py::arg("target_faces"),
+             py::arg("target_vertices"), NoGil());
+  module.def("nearest_corners", &nearest_corners, py::arg("map"), py::arg("target_faces"), NoGil());
 
   module.def("cotan_laplacian", &cotan_laplacian, py::arg("vertices"), py::arg("faces"), NoGil());
   module.def("lumped_mass", &lumped_mass, py::arg("vertices"), py::arg("faces"), NoGil());

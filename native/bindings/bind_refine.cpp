@@ -49,15 +49,11 @@ void bind_refine(py::module_& module) {
 
   py::class_<RefineResult>(module, "RefineResult")
       .def_readonly("point_map", &RefineResult::point_map)
-      .def_property_readonly("faces", [](const RefineResult& r) { return r.surface_map.face; })
-      .def_property_readonly("weights", [](const RefineResult& r) { return r.surface_map.weights; })
+      .def_readonly("surface_map", &RefineResult::surface_map)
       .def_readonly("recovered", &RefineResult::recovered)
       .def_readonly("confidence", &RefineResult::confidence)
       .def_readonly("backward_point_map", &RefineResult::backward_point_map)
-      .def_property_readonly("backward_faces",
-                             [](const RefineResult& r) { return r.backward_surface_map.face; })
-      .def_property_readonly("backward_weights",
-                             [](const RefineResult& r) { return r.backward_surface_map.weights; })
+      .def_readonly("backward_surface_map", &RefineResult::backward_surface_map)
       .def_readonly("report", &RefineResult::report);
 
   py::class_<Refiner, std::shared_ptr<Refiner>>(module, "Refiner")
@@ -77,12 +73,11 @@ void bind_refine(py::module_& module) {
           },
           py::arg("point_map"), py::arg("progress") = nullptr, NoGil())
       .def(
-          "refine_surface_map",
-          [](const Refiner& refiner, Eigen::VectorXi faces, Points weights, Progress* progress) {
-            return refiner.refine(SurfaceMap{std::move(faces), std::move(weights)},
-                                  range(progress));
+          "refine",
+          [](const Refiner& refiner, const SurfaceMap& map, Progress* progress) {
+            return refiner.refine(map, range(progress));
           },
-          py::arg("faces"), py::arg("weights"), py::arg("progress") = nullptr, NoGil())
+          py::arg("map"), py::arg("progress") = nullptr, NoGil())
       .def_property_readonly("notes", &Refiner::notes);
 }
 

@@ -27,5 +27,6 @@ void bind_tasks(py::module_& module);
 void bind_map_metrics(py::module_& module);
 void bind_initial_maps(py::module_& module);
 void bind_refine(py::module_& module);
+void bind_transfer(py::module_& module);
 
 }  // namespace supple::bindings

@@ -13,4 +13,5 @@ PYBIND11_MODULE(_native, module) {
   supple::bindings::bind_map_metrics(module);
   supple::bindings::bind_initial_maps(module);
   supple::bindings::bind_refine(module);
+  supple::bindings::bind_transfer(module);
 }

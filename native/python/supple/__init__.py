@@ -14,6 +14,16 @@ from .blending import blend, falloff_weights, farthest_points
 from .deforming import deform
 from .editing import Editor, EditResult, EditSession, Handle, edit
 from .errors import Cancelled, SuppleError
+from .initial_maps import (
+    InitialMap,
+    MapScore,
+    automatic_map,
+    landmark_map,
+    map_score,
+    nearest_map,
+    uv_map,
+    zoomout_map,
+)
 from .learning import TrainResult, train
 from .map_metrics import (
     Geodesics,
@@ -28,6 +38,21 @@ from .mesh import Mesh, Note, PreparedMesh
 from .metrics import face_distortion, flipped_faces, pose_error, symmetric_dirichlet
 from .model import Model, load_model, shipped_models
 from .parallel import set_thread_count, thread_count
+from .refining import Refiner, RefineResult, refine
+from .transfer import (
+    SurfaceMap,
+    closest_points,
+    load_map,
+    reversed_map,
+    save_map,
+    shrink_fit,
+    transfer_corners,
+    transfer_field,
+    transfer_groups,
+    transfer_shape_keys,
+    transfer_uvs,
+    within_islands,
+)
 
 __all__ = [
     "Cancelled",
@@ -36,19 +61,26 @@ __all__ = [
     "Editor",
     "Geodesics",
     "Handle",
+    "InitialMap",
+    "MapScore",
     "Mesh",
     "Model",
     "Note",
     "PreparedCache",
     "PreparedMesh",
     "Progress",
+    "RefineResult",
+    "Refiner",
     "SuppleError",
+    "SurfaceMap",
     "TrainResult",
     "__version__",
+    "automatic_map",
     "blas_name",
     "blend",
     "cache",
     "chamfer",
+    "closest_points",
     "coverage",
     "deform",
     "edit",
@@ -58,14 +90,30 @@ __all__ = [
     "farthest_points",
     "flipped_faces",
     "geodesic_errors",
+    "landmark_map",
+    "load_map",
     "load_model",
     "map_dirichlet",
+    "map_score",
+    "nearest_map",
     "pose_error",
+    "refine",
+    "reversed_map",
+    "save_map",
     "set_thread_count",
     "shipped_models",
+    "shrink_fit",
     "simd_level",
     "symmetric_dirichlet",
     "thread_count",
     "train",
+    "transfer_corners",
+    "transfer_field",
+    "transfer_groups",
+    "transfer_shape_keys",
+    "transfer_uvs",
+    "uv_map",
     "vertex_inversion",
+    "within_islands",
+    "zoomout_map",
 ]

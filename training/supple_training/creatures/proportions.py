@@ -56,8 +56,6 @@ def grown(
         offset = root - own * chain.points[0]
         span = slice(firsts[number], firsts[number] + chain.joints)
         scale[span], shift[span] = own, offset
-        chains.append(
-            replace(chain, points=own * chain.points + offset, radii=own * chain.radii)
-        )
+        chains.append(replace(chain, points=own * chain.points + offset, radii=own * chain.radii))
     moved = (weights @ scale)[:, None] * vertices + weights @ shift
     return Skeleton(skeleton.family, tuple(chains)), moved
