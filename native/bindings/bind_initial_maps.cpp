@@ -22,15 +22,15 @@ void bind_initial_maps(py::module_& module) {
   module.def(
       "landmark_map",
       [](const PreparedMesh& source, const PreparedMesh& target, const Eigen::VectorXi& from,
-         const Eigen::VectorXi& to, Progress* progress) {
-        return landmark_map(source, target, from, to, range(progress));
-      },
+         const Eigen::VectorXi& to,
+         Progress* progress) { return landmark_map(source, target, from, to, range(progress)); },
       py::arg("source"), py::arg("target"), py::arg("source_landmarks"),
       py::arg("target_landmarks"), py::arg("progress") = nullptr, NoGil());
   module.def(
       "nearest_map",
-      [](const PreparedMesh& source, const PreparedMesh& target, bool aligned,
-         Progress* progress) { return nearest_map(source, target, aligned, range(progress)); },
+      [](const PreparedMesh& source, const PreparedMesh& target, bool aligned, Progress* progress) {
+        return nearest_map(source, target, aligned, range(progress));
+      },
       py::arg("source"), py::arg("target"), py::arg("aligned") = false,
       py::arg("progress") = nullptr, NoGil());
   module.def("uv_map", &uv_map, py::arg("source"), py::arg("target"), py::arg("source_uvs"),

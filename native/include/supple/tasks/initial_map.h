@@ -39,8 +39,8 @@ struct InitialMap {
 MapScore map_score(const PreparedMesh& source, const PreparedMesh& target,
                    const Eigen::VectorXi& point_map);
 
-/// `zoomout` of a map of the callers' vertices. One without a face takes its nearest surface vertex's
-/// place, on either mesh. Errors: those of `zoomout`.
+/// `zoomout` of a map of the callers' vertices. One without a face takes its nearest surface
+/// vertex's place, on either mesh. Errors: those of `zoomout`.
 Eigen::VectorXi zoomout_map(const PreparedMesh& source, const PreparedMesh& target,
                             const Eigen::VectorXi& point_map, const ZoomoutOptions& options = {},
                             ProgressRange progress = {});

@@ -14,7 +14,8 @@ using initial_maps::Candidate;
 using initial_maps::MeshPair;
 
 constexpr Eigen::Index kFitted = 20;  // functions of the first maps
-constexpr Eigen::Index kFirstStep = 2, kStep = 4;
+constexpr Eigen::Index kFirstStep = 1, kStep = 4;
+constexpr Eigen::Index kFirstSamples = 300;
 constexpr Eigen::Index kLeast = 8;
 constexpr int kSignatures = 40;
 constexpr int kSigns = 5;          // functions whose signs are tried, beside the constant
@@ -99,7 +100,7 @@ double apart(const MeshPair& pair, const RowMatrix<double>& a, const RowMatrix<d
 
 InitialMap automatic_map(const PreparedMesh& source, const PreparedMesh& target,
                          ProgressRange progress) {
-  const MeshPair pair(source, target);
+  const MeshPair pair(source, target), few(source, target, {}, kFirstSamples);
   if (pair.count < kLeast) {
     throw Error(ErrorCode::bad_option, "An automatic map needs " + std::to_string(kLeast) +
                                            " eigenfunctions of both meshes; there are " +
@@ -114,7 +115,7 @@ InitialMap automatic_map(const PreparedMesh& source, const PreparedMesh& target,
       maps.push_back(std::move(map));
     }
   }
-  std::vector<Candidate> found = upsampled(pair, maps, k, kFirstStep, first);
+  std::vector<Candidate> found = upsampled(few, maps, k, kFirstStep, first);
   found.resize(std::min(found.size(), kKept));
   maps.clear();
   for (Candidate& candidate : found) {

@@ -19,7 +19,6 @@ namespace supple::initial_maps {
 namespace {
 
 constexpr Eigen::Index kJudged = 60;
-constexpr Eigen::Index kSourceSamples = 1000, kTargetSamples = 2000;
 constexpr Eigen::Index kAlignedSamples = 400;
 constexpr int kAlignmentRounds = 15;
 constexpr double kMirrored = 0.3;
@@ -73,12 +72,12 @@ std::vector<Matrix3> cube_rotations() {
 }  // namespace
 
 MeshPair::MeshPair(const PreparedMesh& source_mesh, const PreparedMesh& target_mesh,
-                   const std::vector<std::pair<int, int>>& extra)
+                   const std::vector<std::pair<int, int>>& extra, Eigen::Index samples)
     : source(source_mesh),
       target(target_mesh),
       count(std::min({kJudged, source.basis.size(), target.basis.size()})),
-      source_samples(samples_of(source, kSourceSamples, parts<0>(extra))),
-      target_samples(samples_of(target, kTargetSamples, parts<1>(extra))),
+      source_samples(samples_of(source, samples, parts<0>(extra))),
+      target_samples(samples_of(target, 2 * samples, parts<1>(extra))),
       source_functions(sampled_functions(source.basis, source_samples, count)),
       target_functions(sampled_functions(target.basis, target_samples, count)) {}
 

@@ -20,8 +20,9 @@ struct Candidate {
 class MeshPair {
  public:
   /// extra: surface vertices that are samples too, at the end of both lists, in this order.
+  /// samples: of the source; the target has twice as many.
   MeshPair(const PreparedMesh& source, const PreparedMesh& target,
-           const std::vector<std::pair<int, int>>& extra = {});
+           const std::vector<std::pair<int, int>>& extra = {}, Eigen::Index samples = 1000);
 
   const PreparedMesh& source;
   const PreparedMesh& target;
