@@ -24,6 +24,8 @@ __all__: list[str] = [
     "Geodesics",
     "Handle",
     "HandleTarget",
+    "InitialMap",
+    "MapScore",
     "Network",
     "Note",
     "PreparedMesh",
@@ -32,6 +34,7 @@ __all__: list[str] = [
     "TrainOptions",
     "TrainingPair",
     "TriangleMesh",
+    "automatic_map",
     "blas_name",
     "blend",
     "chamfer",
@@ -50,8 +53,11 @@ __all__: list[str] = [
     "geodesic_errors",
     "gradient",
     "jacobians",
+    "landmark_map",
     "lumped_mass",
     "map_dirichlet",
+    "map_score",
+    "nearest_map",
     "nearest_rows",
     "network_forward",
     "network_gradient",
@@ -63,8 +69,10 @@ __all__: list[str] = [
     "thread_count",
     "train",
     "train_double",
+    "uv_map",
     "vertex_inversion",
     "zoomout",
+    "zoomout_map",
 ]
 
 class Progress:
@@ -131,6 +139,24 @@ class Geodesics:
     def distances(
         self, source: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+
+class MapScore:
+    @property
+    def area(self) -> float: ...
+    @property
+    def orientation(self) -> float: ...
+    @property
+    def smoothness(self) -> float: ...
+    @property
+    def value(self) -> float: ...
+
+class InitialMap:
+    @property
+    def notes(self) -> list[Note]: ...
+    @property
+    def point_map(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
+    @property
+    def score(self) -> MapScore: ...
 
 class SparseCholesky:
     def __init__(
@@ -537,6 +563,44 @@ def geodesic_errors(
     images: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, n]"],
     progress: Progress = None,
 ) -> list[tuple[float, int]]: ...
+def automatic_map(
+    source: PreparedMesh,
+    target: PreparedMesh,
+    progress: Progress = None,
+) -> InitialMap: ...
+def landmark_map(
+    source: PreparedMesh,
+    target: PreparedMesh,
+    source_landmarks: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+    target_landmarks: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+    progress: Progress = None,
+) -> InitialMap: ...
+def map_score(
+    source: PreparedMesh,
+    target: PreparedMesh,
+    point_map: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+) -> MapScore: ...
+def nearest_map(
+    source: PreparedMesh,
+    target: PreparedMesh,
+    aligned: bool = False,
+    progress: Progress = None,
+) -> InitialMap: ...
+def uv_map(
+    source: PreparedMesh,
+    target: PreparedMesh,
+    source_uvs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    target_uvs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+) -> InitialMap: ...
+def zoomout_map(
+    source: PreparedMesh,
+    target: PreparedMesh,
+    point_map: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+    start: typing.SupportsInt | typing.SupportsIndex,
+    end: typing.SupportsInt | typing.SupportsIndex,
+    step: typing.SupportsInt | typing.SupportsIndex,
+    progress: Progress = None,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
 def zoomout(
     source: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
     source_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
