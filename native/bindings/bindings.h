@@ -24,6 +24,8 @@ void bind_spectral(py::module_& module);
 void bind_learning(py::module_& module);
 void bind_cache(py::module_& module);
 void bind_tasks(py::module_& module);
+void bind_map_metrics(py::module_& module);
+void bind_initial_maps(py::module_& module);
 void bind_refine(py::module_& module);
 void bind_transfer(py::module_& module);
 

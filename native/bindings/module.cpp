@@ -10,6 +10,8 @@ PYBIND11_MODULE(_native, module) {
   supple::bindings::bind_learning(module);
   supple::bindings::bind_cache(module);
   supple::bindings::bind_tasks(module);
+  supple::bindings::bind_map_metrics(module);
+  supple::bindings::bind_initial_maps(module);
   supple::bindings::bind_refine(module);
   supple::bindings::bind_transfer(module);
 }

@@ -14,7 +14,26 @@ from .blending import blend, falloff_weights, farthest_points
 from .deforming import deform
 from .editing import Editor, EditResult, EditSession, Handle, edit
 from .errors import Cancelled, SuppleError
+from .initial_maps import (
+    InitialMap,
+    MapScore,
+    automatic_map,
+    landmark_map,
+    map_score,
+    nearest_map,
+    uv_map,
+    zoomout_map,
+)
 from .learning import TrainResult, train
+from .map_metrics import (
+    Geodesics,
+    chamfer,
+    coverage,
+    face_inversion,
+    geodesic_errors,
+    map_dirichlet,
+    vertex_inversion,
+)
 from .mesh import Mesh, Note, PreparedMesh
 from .metrics import face_distortion, flipped_faces, pose_error, symmetric_dirichlet
 from .model import Model, load_model, shipped_models
@@ -40,7 +59,10 @@ __all__ = [
     "EditResult",
     "EditSession",
     "Editor",
+    "Geodesics",
     "Handle",
+    "InitialMap",
+    "MapScore",
     "Mesh",
     "Model",
     "Note",
@@ -53,18 +75,27 @@ __all__ = [
     "SurfaceMap",
     "TrainResult",
     "__version__",
+    "automatic_map",
     "blas_name",
     "blend",
     "cache",
+    "chamfer",
     "closest_points",
+    "coverage",
     "deform",
     "edit",
     "face_distortion",
+    "face_inversion",
     "falloff_weights",
     "farthest_points",
     "flipped_faces",
+    "geodesic_errors",
+    "landmark_map",
     "load_map",
     "load_model",
+    "map_dirichlet",
+    "map_score",
+    "nearest_map",
     "pose_error",
     "refine",
     "reversed_map",
@@ -81,5 +112,8 @@ __all__ = [
     "transfer_groups",
     "transfer_shape_keys",
     "transfer_uvs",
+    "uv_map",
+    "vertex_inversion",
     "within_islands",
+    "zoomout_map",
 ]

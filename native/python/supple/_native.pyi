@@ -21,8 +21,11 @@ __all__: list[str] = [
     "EditSession",
     "Editor",
     "EmbeddingRecovery",
+    "Geodesics",
     "Handle",
     "HandleTarget",
+    "InitialMap",
+    "MapScore",
     "Network",
     "Note",
     "PreparedMesh",
@@ -36,25 +39,34 @@ __all__: list[str] = [
     "TrainOptions",
     "TrainingPair",
     "TriangleMesh",
+    "automatic_map",
     "blas_name",
     "blend",
+    "chamfer",
     "check_surface_map",
     "closest_points",
     "closest_rotations",
     "cotan_laplacian",
+    "coverage",
     "deform",
     "eigenbasis",
     "face_areas",
     "face_distortion",
+    "face_inversion",
     "falloff_weights",
     "farthest_points",
     "flipped_faces",
     "functional_map",
+    "geodesic_errors",
     "gradient",
     "jacobians",
+    "landmark_map",
     "load_map",
     "lumped_mass",
+    "map_dirichlet",
+    "map_score",
     "nearest_corners",
+    "nearest_map",
     "nearest_rows",
     "network_forward",
     "network_gradient",
@@ -74,8 +86,11 @@ __all__: list[str] = [
     "transfer_field",
     "transfer_groups",
     "transfer_shape_keys",
+    "uv_map",
+    "vertex_inversion",
     "within_islands",
     "zoomout",
+    "zoomout_map",
 ]
 
 class Progress:
@@ -137,6 +152,40 @@ class SurfaceMap:
     def face(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
     @property
     def weights(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+
+class Geodesics:
+    def __init__(
+        self,
+        vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+        faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
+    ) -> None: ...
+    def between(
+        self,
+        sources: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        targets: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, n]"],
+        progress: Progress = None,
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+    def distances(
+        self, source: typing.SupportsInt | typing.SupportsIndex
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+
+class MapScore:
+    @property
+    def area(self) -> float: ...
+    @property
+    def orientation(self) -> float: ...
+    @property
+    def smoothness(self) -> float: ...
+    @property
+    def value(self) -> float: ...
+
+class InitialMap:
+    @property
+    def notes(self) -> list[Note]: ...
+    @property
+    def point_map(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
+    @property
+    def score(self) -> MapScore: ...
 
 class SparseCholesky:
     def __init__(
@@ -626,6 +675,75 @@ def within_islands(
     target_faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
     majority: typing.SupportsFloat | typing.SupportsIndex,
 ) -> tuple[SurfaceMap, int, int]: ...
+def coverage(
+    source: TriangleMesh,
+    target: TriangleMesh,
+    map: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+) -> float: ...
+def face_inversion(
+    source: TriangleMesh,
+    target: TriangleMesh,
+    map: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+) -> float: ...
+def map_dirichlet(
+    source: TriangleMesh,
+    target: TriangleMesh,
+    map: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+) -> float: ...
+def vertex_inversion(
+    source: TriangleMesh,
+    target: TriangleMesh,
+    map: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+) -> float: ...
+def chamfer(
+    a: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    b: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+) -> float: ...
+def geodesic_errors(
+    geodesics: Geodesics,
+    area: typing.SupportsFloat | typing.SupportsIndex,
+    truth: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+    images: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, n]"],
+    progress: Progress = None,
+) -> list[tuple[float, int]]: ...
+def automatic_map(
+    source: PreparedMesh,
+    target: PreparedMesh,
+    progress: Progress = None,
+) -> InitialMap: ...
+def landmark_map(
+    source: PreparedMesh,
+    target: PreparedMesh,
+    source_landmarks: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+    target_landmarks: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+    progress: Progress = None,
+) -> InitialMap: ...
+def map_score(
+    source: PreparedMesh,
+    target: PreparedMesh,
+    point_map: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+) -> MapScore: ...
+def nearest_map(
+    source: PreparedMesh,
+    target: PreparedMesh,
+    aligned: bool = False,
+    progress: Progress = None,
+) -> InitialMap: ...
+def uv_map(
+    source: PreparedMesh,
+    target: PreparedMesh,
+    source_uvs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    target_uvs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+) -> InitialMap: ...
+def zoomout_map(
+    source: PreparedMesh,
+    target: PreparedMesh,
+    point_map: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+    start: typing.SupportsInt | typing.SupportsIndex,
+    end: typing.SupportsInt | typing.SupportsIndex,
+    step: typing.SupportsInt | typing.SupportsIndex,
+    progress: Progress = None,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
 def zoomout(
     source: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
     source_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],

@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from supple_training.compare import against as builds
 from supple_training.compare import difference, machine, report, shapes, tasks
 from supple_training.compare.edits.command import edit
+from supple_training.compare.maps.command import refine
 from supple_training.compare.runner import TRAINING, Build, Comparison, Mesh, Settings
 from supple_training.console import console
 
@@ -199,6 +200,7 @@ def diff(
 
 
 app.command()(edit)
+app.command()(refine)
 
 if __name__ == "__main__":
     app()

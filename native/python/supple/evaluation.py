@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Refinement of maps, measured on a set with known correspondences."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import map_metrics
+from .initial_maps import zoomout_map
+from .match_sets import MatchSet, MatchShape
+from .mesh import PreparedMesh
+from .model import Model
+from .refining import Refiner
+
+Map = NDArray[np.int32]
+INITIAL = "initial"
+# The columns of a report, and whether more is better.
+COLUMNS = {"geodesic": False, "inversion": False, "dirichlet": False, "coverage": True}
+SECONDS = "seconds_per_pair"
+
+ZOOMOUT_FROM, ZOOMOUT_TO, ZOOMOUT_STEP = 20, 120, 5  # the paper's
+
+
+@dataclass(frozen=True)
+class Method:
+    """One way to refine.
+
+    Attributes:
+        bind: from both prepared meshes to what refines maps between them. Only the latter's time is
+            "seconds_per_pair": bases and factors are ready.
+    """
+
+    name: str
+    bind: Callable[[PreparedMesh, PreparedMesh], Callable[[Map], Map]]
+
+
+def _refiner(**options: object) -> Callable[[PreparedMesh, PreparedMesh], Callable[[Map], Map]]:
+    def bind(source: PreparedMesh, target: PreparedMesh) -> Callable[[Map], Map]:
+        refiner = Refiner(source, target, **options)
+        return lambda initial: refiner.refine(initial).point_map
+
+    return bind
+
+
+def _zoomout(source: PreparedMesh, target: PreparedMesh) -> Callable[[Map], Map]:
+    most = min(mesh.native.eigenvalues.size for mesh in (source, target))
+    end = min(ZOOMOUT_TO, most)
+    start = min(ZOOMOUT_FROM, end)
+    return lambda initial: zoomout_map(
+        source, target, initial, start=start, end=end, step=ZOOMOUT_STEP
+    )
+
+
+def methods(model: str | Model = "spectral", **options: object) -> list[Method]:
+    """The rows beside "initial": the same rounds and recovery with and without the network, and the
+    classical ways. options: of Refiner."""
+    return [
+        Method("spectral_projection", _refiner(method="spectral_projection")),
+        Method("no_network", _refiner(model=None, **options)),
+        Method("ljn", _refiner(model=model, **options)),
+        Method("zoomout", _zoomout),
+    ]
+
+
+class Evaluation:
+    """Measures pair after pair; meshes are prepared once each.
+
+    Args:
+        chosen: the methods.
+        runs: times each refinement is measured; the least counts.
+        cache: as of PreparedMesh.
+        note: called with what is being done, and the part of it all that is done.
+    """
+
+    def __init__(
+        self,
+        match_set: MatchSet,
+        chosen: Sequence[Method],
+        *,
+        runs: int = 1,
+        cache: bool = True,
+        note: Callable[[str, float], None] = lambda text, done: None,
+    ) -> None:
+        self._set = match_set
+        self._chosen = list(chosen)
+        self._runs = runs
+        self._cache = cache
+        self._note = note
+        self._prepared: dict[str, PreparedMesh] = {}
+        self._steps = len(match_set.pairs) * (len(self._chosen) + 2)
+        self._done = 0
+
+    def run(self) -> dict:
+        """{"rows": {NAME: means and "change_percent" from initial}, "pairs": count, ...}."""
+        measured = {f"{a} {b}": self._pair(a, b) for a, b in self._set.pairs}
+        return {**summary(list(measured.values())), "set": self._set.name, "measured": measured}
+
+    def _step(self, text: str) -> None:
+        self._note(text, self._done / self._steps)
+        self._done += 1
+
+    def _pair(self, a: str, b: str) -> dict[str, dict[str, float]]:
+        self._step(f"{a} {b}: preparing")
+        source, target = (self._prepare(self._set.shapes[name]) for name in (a, b))
+        start = self._set.initial[a, b]
+        maps, rows = {INITIAL: start}, {INITIAL: {SECONDS: 0.0, "bind_seconds": 0.0}}
+        for method in self._chosen:
+            self._step(f"{a} {b}: {method.name}")
+            began = time.perf_counter()
+            refine = method.bind(source, target)
+            bound = time.perf_counter() - began
+            if self._done <= len(self._chosen) + 2:
+                refine(start)  # the first call of all warms up
+            seconds = []
+            for _ in range(self._runs):
+                began = time.perf_counter()
+                maps[method.name] = refine(start)
+                seconds.append(time.perf_counter() - began)
+            rows[method.name] = {SECONDS: min(seconds), "bind_seconds": bound}
+        self._step(f"{a} {b}: measuring")
+        self._measure(a, b, maps, rows)
+        return rows
+
+    def _measure(self, a: str, b: str, maps: dict[str, Map], rows: dict[str, dict]) -> None:
+        source, target = (self._prepared[name] for name in (a, b))
+        template = self._set.shapes[a].template
+        errors = map_metrics.geodesic_errors(
+            target,
+            self._set.shapes[b].template,
+            np.stack([point_map[template] for point_map in maps.values()], axis=1),
+        )
+        for (name, point_map), error in zip(maps.items(), errors, strict=True):
+            rows[name] |= {
+                "geodesic": error.mean,
+                "unreachable": error.unreachable,
+                "inversion": map_metrics.face_inversion(source, target, point_map),
+                "vertex_inversion": map_metrics.vertex_inversion(source, target, point_map),
+                "dirichlet": map_metrics.map_dirichlet(source, target, point_map),
+                "coverage": map_metrics.coverage(source, target, point_map),
+            }
+
+    def _prepare(self, shape: MatchShape) -> PreparedMesh:
+        if shape.name not in self._prepared:
+            self._prepared[shape.name] = PreparedMesh(
+                shape.vertices, shape.faces, cache=self._cache
+            )
+        return self._prepared[shape.name]
+
+
+def summary(measured: list[dict[str, dict[str, float]]]) -> dict:
+    """Plain means over pairs, and for each row the change from the initial map in percent (None
+    where that is 0)."""
+    rows: dict[str, dict] = {}
+    for name in measured[0]:
+        rows[name] = {
+            column: float(np.mean([pair[name][column] for pair in measured]))
+            for column in measured[0][name]
+        }
+    first = rows[INITIAL]
+    for row in rows.values():
+        row["change_percent"] = {
+            column: 100.0 * (row[column] / first[column] - 1.0) if first[column] > 0 else None
+            for column in COLUMNS
+        }
+    return {"rows": rows, "pairs": len(measured)}
+
+
+def cells(row: dict) -> list[str]:
+    """The columns of a row as text: each figure with its change from the initial map."""
+    texts = []
+    for column in COLUMNS:
+        change = row["change_percent"][column]
+        beside = "" if not change else f" ({change:+.1f}%)"
+        texts.append(f"{row[column]:.3f}{beside}")
+    seconds = row[SECONDS]
+    return [*texts, f"{1e3 * seconds:.0f} ms" if seconds else "-"]
+
+
+def markdown(report: dict) -> str:
+    """The rows as a table."""
+    head = ["map", *COLUMNS, "per pair"]
+    lines = [
+        f"# {report['set']}: {report['pairs']} pairs",
+        "",
+        "Geodesic error x100 of the root of the target's area, exact paths; inverted faces and "
+        "covered area in percent; Dirichlet energy at area 1 (2 for the identity). Means over "
+        "pairs, in brackets the change from the initial map.",
+        "",
+        "| " + " | ".join(head) + " |",
+        "|---|" + "---:|" * (len(head) - 1),
+    ]
+    lines += [f"| {name} | {' | '.join(cells(row))} |" for name, row in report["rows"].items()]
+    lost = sum(row["unreachable"] for row in report["rows"].values())
+    if lost:
+        lines += ["", "Points whose image no path reaches are left out of the geodesic error:"]
+        lines += [
+            f"- {name}: {row['unreachable']:.1f} a pair" for name, row in report["rows"].items()
+        ]
+    return "\n".join(lines) + "\n"
