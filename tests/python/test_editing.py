@@ -79,9 +79,10 @@ def test_rebinding_is_binding_anew(editor):
     turned[2, 3] = 3.0
     handles = [*bending(vertices), Handle("middle", [150, 151, 163, 164], matrix=turned)]
     anew = supple.Editor(editor.prepared, handles).solve().vertices
-    assert np.abs(editor.rebind(handles).solve().vertices - anew).max() < 1e-8
+    # Rounds correct in single precision, in another order after a rebind; the box is 19 long.
+    assert np.abs(editor.rebind(handles).solve().vertices - anew).max() < 2e-6
     back = editor.rebind(handles).rebind(handles[:2])
-    assert np.abs(back.solve().vertices - editor.solve().vertices).max() < 1e-8
+    assert np.abs(back.solve().vertices - editor.solve().vertices).max() < 2e-6
 
 
 @pytest.mark.parametrize(

@@ -158,7 +158,8 @@ def test_the_share_of_creatures_decides_and_bad_ones_are_refused(monkeypatch):
     settings = pairs.PairSettings(creature_share=1.0, held_out=True, rest_share=1.0)
     with pytest.raises(RuntimeError, match="a creature"):
         pairs.make_pair(settings, 0)
-    assert made == [{"held_out": True, "at_rest": True, "vertices": (3500, 6500)}]
+    expected = {"held_out": True, "at_rest": True, "other_proportions": False}
+    assert made == [{**expected, "vertices": (3500, 6500)}]
     with pytest.raises(ValueError, match="creature_share"):
         pairs.PairSettings(creature_share=1.5)
 

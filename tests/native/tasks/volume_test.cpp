@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tasks/edit/volume.h"
 
+#include <Eigen/LU>
 #include <cmath>
 #include <numbers>
 

@@ -21,6 +21,8 @@ constexpr int kSignatures = 40;
 constexpr int kSigns = 5;          // functions whose signs are tried, beside the constant
 constexpr size_t kAlignments = 4;  // of the 24
 constexpr size_t kKept = 6;        // candidates that are upsampled to the end
+// Maps that differ by less than this part of themselves are one candidate.
+constexpr double kSame = 0.3;
 // Two candidates are as good: scores within this part. Elsewhere: this far apart, in roots of the
 // area, on average.
 constexpr double kAsGood = 0.05, kElsewhere = 0.1;
@@ -116,10 +118,14 @@ InitialMap automatic_map(const PreparedMesh& source, const PreparedMesh& target,
     }
   }
   std::vector<Candidate> found = upsampled(few, maps, k, kFirstStep, first);
-  found.resize(std::min(found.size(), kKept));
   maps.clear();
   for (Candidate& candidate : found) {
-    maps.push_back(std::move(candidate.map));
+    const bool known = std::any_of(maps.begin(), maps.end(), [&](const RowMatrix<double>& map) {
+      return (map - candidate.map).norm() < kSame * map.norm();
+    });
+    if (!known && maps.size() < kKept) {
+      maps.push_back(std::move(candidate.map));
+    }
   }
   found = upsampled(pair, maps, pair.count, kStep, progress.stage("upsampling the best", 0.5, 0.8));
   InitialMap result = pair.finished(found[0].map, progress.stage("finding vertices", 0.8, 1.0));
