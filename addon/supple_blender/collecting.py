@@ -7,7 +7,12 @@ from . import groups, mesh_data, motions, pose, space
 def options_of(obj):
     """Return the `pose.Options` set on obj."""
     body = obj.supple
-    return pose.Options(stiffness=body.stiffness, method=body.method.lower(), network=body.network)
+    return pose.Options(
+        stiffness=body.stiffness,
+        method=body.method.lower(),
+        network=body.network,
+        keep_volume=body.keep_volume,
+    )
 
 
 def blend_of(obj, world):

@@ -36,9 +36,9 @@ class LostError(Exception):
     """Live can't go on: undo, the user or a script removed what it writes to."""
 
 
-def _bones(obj):
-    """Return what decides which vertices are whose, to compare."""
-    return [(row.name, row.bone, row.least) for row in obj.supple.handles]
+def _bound_to(obj):
+    """Return what a solver is bound to, to compare: which vertices are whose, and the weights."""
+    return [(row.name, row.bone, row.least, row.weight) for row in obj.supple.handles]
 
 
 def _blend_settings(obj, world):
@@ -164,7 +164,7 @@ class Follower:
         now = time.monotonic()
         if now - self._failed < CHECK_SECONDS and self._failed:
             return False
-        if self._warm is None or self._made_for != _bones(obj):
+        if self._warm is None or self._made_for != _bound_to(obj):
             return True
         if len(obj.data.vertices) != len(self._warm.rest.positions):
             return True
@@ -184,7 +184,7 @@ class Follower:
         """Make the solver for obj as it is, on a thread or, with wait, at once."""
         self._paused, self._warm = False, None
         inputs = collecting.collect_pose(place, obj)
-        self._made_for, self._options = _bones(obj), inputs.options
+        self._made_for, self._options = _bound_to(obj), inputs.options
         self._blend = _blend_settings(obj, place.world_matrix(obj))
         self._vertices = {motion.name: motion.vertices for motion in inputs.motions}
         self._matrices = [motion.matrix for motion in inputs.motions]

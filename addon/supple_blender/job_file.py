@@ -27,12 +27,14 @@ class Source:
 class Move:
     """What a vertex group does: `matrix` is a world motion (4, 4) or None if the group is held.
 
+    weight: 1 for exactly there, less for a pull.
     about_centroid: the matrix acts about the centre of the group instead of the world's origin.
     """
 
     group: str
     matrix: np.ndarray | None
     about_centroid: bool
+    weight: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,7 @@ class Job:
     moves: list
     mode: str
     network: bool
+    keep_volume: bool
     key: str
     overwrite: bool
     blend: Path | None
@@ -170,24 +173,27 @@ def _move(table):
     matrix = table.numbers("matrix", (4, 4))
     translate = table.numbers("translate", (3,))
     rotate = table.table("rotate")
+    weight = table.take("weight", float, 1.0)
     table.end()
+    if not 0 < weight <= 1:
+        raise table.error("weight", f"must be more than 0 and at most 1, not {weight}")
     moved = [matrix is not None, translate is not None or rotate is not None]
     if held + sum(moved) != 1:
         raise table.error(
             "group", f"'{group}' needs one of: held = true, matrix, translate and/or rotate"
         )
     if held:
-        return Move(group, None, about_centroid=False)
+        return Move(group, None, about_centroid=False, weight=weight)
     if matrix is None:
         motion = np.eye(4)
         motion[:3, :3] = np.eye(3) if rotate is None else _rotation(rotate)
         motion[:3, 3] = 0 if translate is None else translate
-        return Move(group, motion, about_centroid=True)
+        return Move(group, motion, about_centroid=True, weight=weight)
     if not np.array_equal(matrix[3], [0, 0, 0, 1]):
         raise table.error("matrix", "its last row must be 0, 0, 0, 1")
     if abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
         raise table.error("matrix", f"flattens group '{group}' (determinant 0); check its numbers")
-    return Move(group, matrix, about_centroid=False)
+    return Move(group, matrix, about_centroid=False, weight=weight)
 
 
 def _moves(top, file):
@@ -250,6 +256,7 @@ def read(path, out=None):
         moves=_moves(top, path),
         mode=options.choice("mode", ("natural", "stiff"), "natural"),
         network=options.take("network", bool, True),
+        keep_volume=options.take("keep_volume", bool, True),
         key=output.take("shape_key", str, required=True),
         overwrite=output.take("overwrite", bool, False),
         blend=output.path("blend", out, required=True),

@@ -108,14 +108,14 @@ def _add_groups(obj, path, file):
 
 def _motion(move, vertices, rest, world):
     if move.matrix is None:
-        return motions.Motion(move.group, vertices, None)
+        return motions.Motion(move.group, vertices, None, move.weight)
     motion = move.matrix
     if move.about_centroid:
         centre = space.to_world_points(world, rest.positions[vertices]).mean(axis=0)
         to_centre = np.eye(4)
         to_centre[:3, 3] = -centre
         motion = np.linalg.inv(to_centre) @ motion @ to_centre
-    return motions.Motion(move.group, vertices, space.to_local_matrix(world, motion))
+    return motions.Motion(move.group, vertices, space.to_local_matrix(world, motion), move.weight)
 
 
 def _pose(job, obj):
@@ -124,7 +124,9 @@ def _pose(job, obj):
     found = groups.members(obj, [move.group for move in job.moves])
     groups.require_members(obj.name, found)
     moves = [_motion(move, found[move.group], rest, world) for move in job.moves]
-    options = pose.Options(stiffness=STIFFNESS[job.mode], network=job.network)
+    options = pose.Options(
+        stiffness=STIFFNESS[job.mode], network=job.network, keep_volume=job.keep_volume
+    )
     pose_input = pose.PoseInput(rest=rest, motions=moves, options=options)
     return pose_input, pose.solve(pose_input, Stages())
 

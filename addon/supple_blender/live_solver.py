@@ -14,6 +14,7 @@ class Options:
     stiffness: float = 0.0
     method: str = "supple"
     network: bool = True
+    keep_volume: bool = True
 
     def arguments(self):
         """Return what `supple.Editor.solve` and `session` take of this."""
@@ -21,6 +22,7 @@ class Options:
             "stiffness": self.stiffness,
             "method": self.method,
             "network": self.network,
+            "keep_volume": self.keep_volume,
         }
 
 

@@ -11,11 +11,14 @@ from .errors import UserError
 
 @dataclass(frozen=True)
 class Motion:
-    """What a handle does: vertices (k,), and a local matrix (4, 4) or None where it is held."""
+    """What a handle does: vertices (k,), a local matrix (4, 4) or None where it is held, and its
+    weight, 1 where that is exact.
+    """
 
     name: str
     vertices: np.ndarray
     matrix: np.ndarray | None
+    weight: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,7 @@ def collect(place, obj, world, vertices):
             name=row.name,
             vertices=vertices[row.name],
             matrix=None if row.kind == "HELD" else _matrix(place, obj, row, to_local),
+            weight=row.weight,
         )
         for row in obj.supple.handles
     ]

@@ -38,7 +38,7 @@ def _draw_text(layout, text, icon):
 
 
 class SUPPLE_UL_handles(bpy.types.UIList):
-    """One row a handle: its group, its kind, a button that selects what moves it."""
+    """One row a handle: its kind, its group, its weight, a button that selects what moves it."""
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property):
         row = layout.row(align=True)
@@ -47,6 +47,9 @@ class SUPPLE_UL_handles(bpy.types.UIList):
             row.label(text=item.name, icon="BONE_DATA")
         else:
             row.label(text=item.name)
+        weight = row.row(align=True)
+        weight.scale_x = 0.6
+        weight.prop(item, "weight", text="", slider=True)
         row.operator(
             SUPPLE_OT_handle_select.bl_idname, text="", icon="RESTRICT_SELECT_OFF"
         ).name = item.name
@@ -178,9 +181,10 @@ class SUPPLE_PT_look(_PoseSettings, bpy.types.Panel):
         layout.prop_search(obj.supple, "mask", obj, "vertex_groups")
         layout.prop(obj.supple, "falloff")
         layout.prop(obj.supple, "method")
-        row = layout.row()
-        row.active = obj.supple.method == "SUPPLE"
-        row.prop(obj.supple, "network", text="Learned")
+        column = layout.column()
+        column.active = obj.supple.method == "SUPPLE"
+        column.prop(obj.supple, "network", text="Learned")
+        column.prop(obj.supple, "keep_volume")
 
 
 class SUPPLE_PT_distortion(_PoseSettings, bpy.types.Panel):

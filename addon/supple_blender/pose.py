@@ -76,6 +76,7 @@ def native_handles(rest, motions):
             matrix=None
             if motion.matrix is None
             else space.to_solve_matrix(rest.stretch, motion.matrix),
+            weight=motion.weight,
         )
         for motion in motions
     ]
@@ -121,14 +122,16 @@ def _solve(pose_input, stages):
 
 
 def figures(pose_input, pose):
-    """Return how good a Pose is: handle_error (largest distance of a handle's vertex to its target,
-    as a part of the bounding box's diagonal), symmetric_dirichlet and flipped_faces, in the shape
-    as the object's scale shows it.
+    """Return how good a Pose is: handle_error (largest distance to its target of a vertex whose
+    handle has weight 1, as a part of the bounding box's diagonal), symmetric_dirichlet and
+    flipped_faces, in the shape as the object's scale shows it.
     """
     supple = native.supple()
     rest = pose_input.rest
     error = 0.0
     for motion in pose_input.motions:
+        if motion.weight < 1:
+            continue
         at_rest, posed = rest.positions[motion.vertices], pose.positions[motion.vertices]
         matrix = np.eye(4) if motion.matrix is None else motion.matrix
         target = at_rest @ matrix[:3, :3].T + matrix[:3, 3]

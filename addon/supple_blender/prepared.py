@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What was computed once for a mesh and its handles, kept in memory; meshes also on disk.
 
-Entries are found by their content (geometry and handle vertices), so that a changed mesh, an undo,
+Entries are found by their content (geometry, handle vertices and weights), so that a changed mesh, an undo,
 a renamed object or another file can never meet a stale one.
 """
 
@@ -97,6 +97,7 @@ def _handles_key(handles):
     for handle in handles:
         digest.update(handle.name.encode() + b"\0")
         digest.update(np.int64(len(handle.vertices)).tobytes())
+        digest.update(np.float64(handle.weight).tobytes())
         digest.update(np.ascontiguousarray(handle.vertices, dtype=np.int64).tobytes())
     return digest.hexdigest()
 

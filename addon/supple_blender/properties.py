@@ -47,6 +47,15 @@ class SUPPLE_PG_handle(bpy.types.PropertyGroup):
     )
     armature: PointerProperty(name="Armature", type=bpy.types.Object)
     bone: StringProperty(name="Bone", description="The bone that moves it, in place of an Empty")
+    weight: FloatProperty(
+        name="Weight",
+        description="1: exactly where its Empty or bone asks; less: a pull, which the rest of the "
+        "mesh may resist",
+        default=1.0,
+        min=0.01,
+        max=1.0,
+        subtype="FACTOR",
+    )
     least: FloatProperty(
         name="Least Weight",
         description="Vertices with at least this weight in the group are in the handle",
@@ -105,6 +114,11 @@ class SUPPLE_PG_body(bpy.types.PropertyGroup):
     network: BoolProperty(
         name="Learned Detail",
         description="Use what was learned from bodies; off compares with the plain solve",
+        default=True,
+    )
+    keep_volume: BoolProperty(
+        name="Keep Volume",
+        description="Give closed bodies back most of the volume that bending takes from them",
         default=True,
     )
     key_name: StringProperty(

@@ -126,10 +126,10 @@ void bind_tasks(py::module_& module) {
       .def_property_readonly("residual", [](const PreparedMesh& p) { return p.basis.residual; });
 
   py::class_<Handle>(module, "Handle")
-      .def(py::init([](const std::string& name, const Eigen::VectorXi& vertices) {
-             return Handle{name, vertices};
+      .def(py::init([](const std::string& name, const Eigen::VectorXi& vertices, double weight) {
+             return Handle{name, vertices, weight};
            }),
-           py::arg("name"), py::arg("vertices"));
+           py::arg("name"), py::arg("vertices"), py::arg("weight") = 1.0);
 
   py::class_<HandleTarget>(module, "HandleTarget")
       .def(py::init([](const std::optional<Eigen::Matrix4d>& matrix,

@@ -372,7 +372,10 @@ class PreparedMesh:
 
 class Handle:
     def __init__(
-        self, name: str, vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"]
+        self,
+        name: str,
+        vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"],
+        weight: typing.SupportsFloat | typing.SupportsIndex = 1.0,
     ) -> None: ...
 
 class HandleTarget:

@@ -98,12 +98,12 @@ def _read_handles(path: Path) -> list[Handle]:
     for i, entry in enumerate(content["handles"]):
         if not isinstance(entry, dict) or "vertices" not in entry:
             raise SuppleError("bad_case", f"{path}: handle {i} has no 'vertices'.")
-        unknown = set(entry) - {"name", "vertices", "matrix", "positions"}
+        unknown = set(entry) - {"name", "vertices", "matrix", "positions", "weight"}
         if unknown:
             raise SuppleError(
                 "bad_case",
                 f"{path}: handle {i} has '{sorted(unknown)[0]}', which is none of name, vertices, "
-                "matrix, positions.",
+                "matrix, positions, weight.",
             )
         handles.append(
             Handle(
@@ -111,6 +111,7 @@ def _read_handles(path: Path) -> list[Handle]:
                 entry["vertices"],
                 entry.get("matrix"),
                 entry.get("positions"),
+                entry.get("weight", 1.0),
             )
         )
     return handles

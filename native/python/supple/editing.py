@@ -23,16 +23,19 @@ class Handle:
         vertices: (k,) 0-based indices; no vertex in two handles.
         matrix: (4, 4) affine, for column vectors, from rest to target positions; or None.
         positions: (k, 3) target positions in the caller's units; or None.
+        weight: 1 for exactly there; above 0 and below 1 for a pull that the mesh may resist, about
+            even at 0.5. Bound with the vertices: another weight needs a rebind.
     """
 
     name: str
     vertices: ArrayLike
     matrix: ArrayLike | None = None
     positions: ArrayLike | None = None
+    weight: float = 1.0
 
     def _native_handle(self) -> _native.Handle:
         vertices = arrays.indices(self.vertices, f"Handle '{self.name}': vertices")
-        return _native.Handle(self.name, vertices)
+        return _native.Handle(self.name, vertices, float(self.weight))
 
     def _native_target(self) -> _native.HandleTarget:
         where = f"Handle '{self.name}'"
@@ -49,7 +52,8 @@ class EditResult:
     """A posed mesh.
 
     Attributes:
-        vertices: (n, 3) float64, the caller's units; handle vertices exactly on their targets.
+        vertices: (n, 3) float64, the caller's units; vertices of handles of weight 1 exactly on
+            their targets.
         notes: what is unusual about the mesh.
         report: rounds, polish, passes, network (whether it was used), and the milliseconds of each
             stage.

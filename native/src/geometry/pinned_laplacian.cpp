@@ -55,6 +55,7 @@ void find_references(const PinnedLaplacian& base, const Eigen::VectorXi& held,
 // The Gram matrix of the differences to the references, factored. It is definite: the differences
 // of distinct vertices' Green's functions are independent.
 Eigen::LLT<Eigen::MatrixXd> complement_of(const RowMatrix<double>& gram,
+                                          const Eigen::VectorXd& compliance,
                                           const Eigen::VectorXi& reference,
                                           const Eigen::VectorXi& free) {
   Eigen::MatrixXd differences(free.size(), free.size());
@@ -63,7 +64,9 @@ Eigen::LLT<Eigen::MatrixXd> complement_of(const RowMatrix<double>& gram,
     for (Eigen::Index j = 0; j < free.size(); ++j) {
       const int b = free[j], rb = reference[b];
       differences(i, j) = gram(a, b) - gram(ra, b) - gram(a, rb) + gram(ra, rb);
+      differences(i, j) += ra == rb ? compliance[ra] : 0.0;
     }
+    differences(i, i) += compliance[free[i]];
   }
   const SingleThread small;
   Eigen::LLT<Eigen::MatrixXd> result(differences);
@@ -105,11 +108,15 @@ RowMatrix<double> PinnedLaplacian::without_pins(RowMatrix<double> rows) const {
 
 BiharmonicInterpolation::BiharmonicInterpolation(std::shared_ptr<const PinnedLaplacian> base,
                                                  Eigen::VectorXi points,
-                                                 const BiharmonicInterpolation* former)
-    : base_(std::move(base)), points_(std::move(points)) {
+                                                 const BiharmonicInterpolation* former,
+                                                 Eigen::VectorXd compliance)
+    : base_(std::move(base)), points_(std::move(points)), compliance_(std::move(compliance)) {
+  if (compliance_.size() == 0) {
+    compliance_ = Eigen::VectorXd::Zero(points_.size());
+  }
   find_references(*base_, points_, reference_, free_);
   find_kernels(former != nullptr && former->base_ == base_ ? former : nullptr);
-  complement_ = complement_of(gram_, reference_, free_);
+  complement_ = complement_of(gram_, compliance_, reference_, free_);
 }
 
 void BiharmonicInterpolation::find_kernels(const BiharmonicInterpolation* former) {
@@ -227,7 +234,8 @@ RowMatrix<double> BiharmonicInterpolation::solve(const RowMatrix<double>& values
   RowMatrix<double> offset(base_->component_count(), c);
   for (Eigen::Index i = 0; i < points_.size(); ++i) {
     if (reference_[i] == i) {
-      offset.row(base_->component()[points_[i]]) = values.row(i) - result.row(points_[i]);
+      offset.row(base_->component()[points_[i]]) =
+          values.row(i) - result.row(points_[i]) - compliance_[i] * force.row(i);
     }
   }
 #pragma omp parallel for schedule(static)

@@ -122,6 +122,34 @@ RowMatrix<double> densely(const SurfaceOperators& operators, const Eigen::Vector
   return result;
 }
 
+TEST(BiharmonicInterpolation, MissesValuesByAsMuchAsTheirCompliance) {
+  for (const zoo::Mesh& mesh : {zoo::perturbed_sphere(2, 3), zoo::disc(6, 12),
+                                zoo::joined(zoo::icosphere(1), zoo::cube())}) {
+    const SurfaceOperators operators = operators_of(mesh);
+    const Eigen::VectorXi points = some_points(operators, 5);
+    const RowMatrix<double> values = test::noise(points.size(), 3, 7);
+    // References are among the soft ones, and some points are passed through.
+    Eigen::VectorXd compliance(points.size());
+    for (Eigen::Index i = 0; i < points.size(); ++i) {
+      compliance[i] = i % 3 == 2 ? 0.0 : 1e-3 * static_cast<double>(1 + i);
+    }
+    // x^T W M^-1 W x + sum (x - value)^2 / compliance, densely; almost none stands for none.
+    const Eigen::MatrixXd w(operators.laplacian);
+    Eigen::MatrixXd system = w * operators.mass.cwiseInverse().asDiagonal() * w;
+    Eigen::MatrixXd load = Eigen::MatrixXd::Zero(w.rows(), 3);
+    for (Eigen::Index i = 0; i < points.size(); ++i) {
+      const double weight = 1.0 / std::max(compliance[i], 1e-9);
+      system(points[i], points[i]) += weight;
+      load.row(points[i]) += weight * values.row(i);
+    }
+    const Eigen::MatrixXd expected = system.ldlt().solve(load);
+    const RowMatrix<double> got =
+        BiharmonicInterpolation(pinned(operators), points, nullptr, compliance).solve(values);
+    EXPECT_LT((got - expected).norm(), 1e-5 * expected.norm());
+    EXPECT_GT((got(points, Eigen::all) - values).norm(), 0.01 * values.norm());
+  }
+}
+
 TEST(BiharmonicInterpolation, IsTheLeastBilaplacianEnergy) {
   for (const zoo::Mesh& mesh : {zoo::perturbed_sphere(2, 3), zoo::disc(6, 12), zoo::torus(12, 7),
                                 zoo::joined(zoo::icosphere(1), zoo::cube())}) {

@@ -61,6 +61,13 @@ TEST_F(EditorErrors, AVertexTwiceInOneHandle) {
   EXPECT_TRUE(binding_fails(ErrorCode::overlapping_handles, {"'hand'", "5", "twice"}));
 }
 
+TEST_F(EditorErrors, AWeightThatIsNone) {
+  for (const double weight : {0.0, -0.5, 1.5, std::numeric_limits<double>::quiet_NaN()}) {
+    handles[1].weight = weight;
+    EXPECT_TRUE(binding_fails(ErrorCode::bad_option, {"'hand'", "weight", "at most 1"}));
+  }
+}
+
 TEST_F(EditorErrors, OnlyVerticesWithoutFaces) {
   mesh_ = test::prepared(zoo::with_unused_vertices(zoo::icosphere(1)), 20);
   handles = {{"dust", indices({0})}};

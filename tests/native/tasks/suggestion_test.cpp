@@ -15,6 +15,8 @@ Matrix3 about(const Eigen::Vector3d& axis, double angle) {
   return Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix().transpose();
 }
 
+Eigen::VectorXd ones(Eigen::Index count) { return Eigen::VectorXd::Ones(count); }
+
 void expect_motion(const RigidMotion& motion, const Matrix3& turn, const Eigen::RowVector3d& offset,
                    double tolerance) {
   EXPECT_LT((motion.rotation - turn).norm(), tolerance);
@@ -27,7 +29,7 @@ TEST(NearestMotion, OfARigidMotionIsThatMotion) {
   for (uint64_t which = 0; which < 8; ++which) {
     const Matrix3 turn = test::rotation(which);
     const Eigen::RowVector3d offset(1.0, -2.0, 0.5);
-    expect_motion(nearest_motion(rest, (rest * turn).rowwise() + offset, {turn}), turn, offset,
+    expect_motion(nearest_motion(rest, (rest * turn).rowwise() + offset, ones(9), {turn}), turn, offset,
                   1e-10);
   }
 }
@@ -38,17 +40,30 @@ TEST(NearestMotion, WhatPointsLeaveOpenTheTurnsDecide) {
   line.col(2) << 0.0, 0.1, 0.5, 1.0;
   const Matrix3 turn = about({0, 0, 1}, 1.3);
   const Eigen::RowVector3d offset(0.2, 0.3, 0.4);
-  expect_motion(nearest_motion(line, (line * turn).rowwise() + offset, {turn}), turn, offset,
+  expect_motion(nearest_motion(line, (line * turn).rowwise() + offset, ones(4), {turn}), turn, offset,
                 1e-10);
   const Points one = line.bottomRows(1);
-  expect_motion(nearest_motion(one, (one * turn).rowwise() + offset, {turn}), turn, offset, 1e-10);
+  expect_motion(nearest_motion(one, (one * turn).rowwise() + offset, ones(1), {turn}), turn, offset, 1e-10);
 }
 
 TEST(NearestMotion, WhatNothingDecidesDoesNotTurn) {
   const Points one = test::noise(1, 3, 1);
   const Points moved = one.rowwise() + Eigen::RowVector3d(1, 2, 3);
-  EXPECT_LT((nearest_motion(one, moved, {}).rotation - Matrix3::Identity()).norm(), 1e-15);
-  EXPECT_LT((nearest_motion(one, moved, {})(one.row(0)) - moved.row(0)).norm(), 1e-15);
+  EXPECT_LT((nearest_motion(one, moved, ones(1), {}).rotation - Matrix3::Identity()).norm(), 1e-15);
+  EXPECT_LT((nearest_motion(one, moved, ones(1), {})(one.row(0)) - moved.row(0)).norm(), 1e-15);
+}
+
+TEST(NearestMotion, APointCountsAsMuchAsItsWeight) {
+  const Points rest = test::noise(6, 3, 3), moved = test::noise(6, 3, 4);
+  Eigen::VectorXd weights = ones(6);
+  weights.tail(2).setConstant(2.0);
+  Points rest_twice(8, 3), moved_twice(8, 3);
+  rest_twice << rest, rest.bottomRows(2);
+  moved_twice << moved, moved.bottomRows(2);
+  const RigidMotion twice = nearest_motion(rest_twice, moved_twice, ones(8), {});
+  const RigidMotion weighed = nearest_motion(rest, moved, weights, {});
+  EXPECT_LT((weighed.rotation - twice.rotation).norm(), 1e-10);
+  EXPECT_LT((weighed.to - twice.to).norm(), 1e-12);
 }
 
 TEST(RotationAround, OfAPatchThatTurnsIsItsTurn) {

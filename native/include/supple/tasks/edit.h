@@ -20,6 +20,9 @@ namespace supple {
 struct Handle {
   std::string name;
   Eigen::VectorXi vertices;  ///< 0-based; distinct, also between handles
+  /// 1: on its target exactly. From 0 to 1: a pull, which the rest of the mesh may resist; at 0.5
+  /// about as strong as what it costs to move a single point of a surface whose edge is held.
+  double weight = 1.0;
 };
 
 /// Where a handle's vertices are to be, in the caller's units. Neither set: held where they are.
@@ -71,12 +74,14 @@ struct EditReport {
 };
 
 struct EditResult {
-  Points vertices;  ///< n x 3, in the caller's units; handle vertices exactly on their targets
+  /// n x 3, in the caller's units; vertices of handles of weight 1 exactly on their targets.
+  Points vertices;
   EditReport report;
 };
 
 class EditSession;
 class EnclosedVolume;
+struct SoftHandles;
 
 /// Handles bound to a prepared mesh, for any targets. Immutable.
 class Editor {
@@ -85,7 +90,8 @@ class Editor {
   /// former: an editor of the same prepared mesh with other handles; what the two share is not
   /// computed again, and the result is the same to rounding.
   /// Errors: `no_handles`, `empty_handle`, `index_out_of_range`, `overlapping_handles`;
-  /// `bad_option` if the network takes another signal. Messages name the handle.
+  /// `bad_option` for a weight outside of ]0, 1] or if the network takes another signal. Messages
+  /// name the handle.
   Editor(std::shared_ptr<const PreparedMesh> prepared, std::vector<Handle> handles,
          std::shared_ptr<const LocalJacobianNetwork<float>> network, ProgressRange progress = {},
          const Editor* former = nullptr);
@@ -111,7 +117,9 @@ class Editor {
   Eigen::VectorXi held_handle_;   // for each of held_: its handle, or -1
   Eigen::Index handle_rows_ = 0;  // how many of held_ belong to handles
   Eigen::VectorXi anchor_;        // per component: surface vertex it follows, -1 if it has a handle
+  Eigen::VectorXi firm_;          // places in held_ that are on their targets exactly
   Eigen::VectorXi guides_;        // places in held_ whose rotations the suggestion interpolates
+  std::shared_ptr<const SoftHandles> soft_;  // the other places
   std::shared_ptr<const HeldSystem> poisson_;
   std::shared_ptr<const BiharmonicInterpolation> interpolation_;
   std::shared_ptr<const EnclosedVolume> volume_;

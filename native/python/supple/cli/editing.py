@@ -42,6 +42,9 @@ def edit(
         typer.Option(min=0.0, max=1.0, help="Between natural (0) and stiff (1), in mode's place."),
     ] = None,
     network: Annotated[bool, typer.Option(help="Use the network, or the identity.")] = True,
+    keep_volume: Annotated[
+        bool, typer.Option(help="Give closed bodies back most of the volume that bending takes.")
+    ] = True,
     model: Annotated[str, typer.Option(help="Shipped network or .safetensors file.")] = "rotation",
     cache: Annotated[bool, typer.Option(help="Keep prepared meshes on disk, and use them.")] = True,
 ) -> None:
@@ -51,7 +54,8 @@ def edit(
     """
     figures: dict[str, dict] = {}
     errors: dict[str, str] = {}
-    how = {"mode": mode.value} if stiffness is None else {"stiffness": stiffness}
+    how: dict[str, object] = {"mode": mode.value} if stiffness is None else {"stiffness": stiffness}
+    how["keep_volume"] = keep_volume
     try:
         chosen = supple.load_model(model) if network else None
         out.mkdir(parents=True, exist_ok=True)
@@ -98,8 +102,12 @@ def _edit_case(
     result = watched(f"{case.name}: solving", lambda p: editor.solve(**how, progress=p))
     times = sorted(editor.solve(**how).report["milliseconds"] for _ in range(_MEASURED_SOLVES))
     error = max(
-        np.linalg.norm(result.vertices[handle.vertices] - target, axis=1).max()
-        for handle, target in zip(case.handles, _targets(case), strict=True)
+        (
+            np.linalg.norm(result.vertices[handle.vertices] - target, axis=1).max()
+            for handle, target in zip(case.handles, _targets(case), strict=True)
+            if handle.weight == 1
+        ),
+        default=0.0,
     )
     pose_error = None
     if case.truth is not None:

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "handle_checks.h"
+#include "soft_handles.h"
 #include "suggestion.h"
 #include "supple/core/error.h"
 #include "supple/geometry/nearest.h"
@@ -79,6 +82,50 @@ Eigen::VectorXi choose_guides(const SurfaceOperators& operators, const std::vect
   return vector_of(guides);
 }
 
+// The places that are on their targets exactly, and the pulls of the others. groups: as above.
+std::pair<Eigen::VectorXi, SoftHandles> by_weight(const SurfaceOperators& operators,
+                                                  const std::vector<Handle>& handles,
+                                                  const std::vector<int>& held,
+                                                  const std::vector<int>& groups) {
+  Eigen::VectorXd mass = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(handles.size()));
+  std::vector<int> firm, places, vertices;
+  for (size_t place = 0; place < held.size(); ++place) {
+    const int h = groups[place];
+    if (h < 0 || handles[static_cast<size_t>(h)].weight == 1.0) {
+      firm.push_back(static_cast<int>(place));
+    } else {
+      mass[h] += operators.mass[held[place]];
+      places.push_back(static_cast<int>(place));
+      vertices.push_back(held[place]);
+    }
+  }
+  SoftHandles soft{vector_of(places), vector_of(vertices),
+                   Eigen::VectorXd(static_cast<Eigen::Index>(places.size()))};
+  for (Eigen::Index i = 0; i < soft.pull.size(); ++i) {
+    const int h = groups[static_cast<size_t>(soft.places[i])];
+    soft.pull[i] = pull_of(handles[static_cast<size_t>(h)].weight) *
+                   operators.mass[soft.vertices[i]] / mass[h];
+  }
+  return {vector_of(firm), std::move(soft)};
+}
+
+// A guide's compliance each. guides: places; groups: the handle of each place.
+Eigen::VectorXd compliances(const std::vector<Handle>& handles, const Eigen::VectorXi& guides,
+                            const Eigen::VectorXi& groups) {
+  const auto shared_by = [&](int group) {
+    return std::count_if(guides.begin(), guides.end(),
+                         [&](int place) { return groups[place] == group; });
+  };
+  Eigen::VectorXd result = Eigen::VectorXd::Zero(guides.size());
+  for (Eigen::Index g = 0; g < guides.size(); ++g) {
+    const int h = groups[guides[g]];
+    if (h >= 0) {
+      result[g] = compliance_of(handles[static_cast<size_t>(h)].weight, shared_by(h));
+    }
+  }
+  return result;
+}
+
 }  // namespace
 
 EditMethod edit_method(const std::string& name) {
@@ -149,20 +196,26 @@ void Editor::bind(const Editor* former, const ProgressRange& progress) {
   for (Eigen::Index g = 0; g < points.size(); ++g) {
     points[g] = held_[guides_[g]];
   }
+  auto [firm, soft] = by_weight(operators, handles_, held, groups);
+  firm_ = std::move(firm);
+  soft_ = std::make_shared<const SoftHandles>(std::move(soft));
+  const Eigen::VectorXi firm_vertices = held_(firm_);
   progress.report(0.1);
-  if (former != nullptr) {
-    if (std::optional<HeldSystem> changed = former->poisson_->changed(held_)) {
+  if (former != nullptr && *former->soft_ == *soft_) {
+    if (std::optional<HeldSystem> changed = former->poisson_->changed(firm_vertices)) {
       poisson_ = std::make_shared<const HeldSystem>(std::move(*changed));
     }
   }
   if (poisson_ == nullptr) {
-    poisson_ = std::make_shared<const HeldSystem>(operators.laplacian, held_, prepared_->symbolic);
+    poisson_ = std::make_shared<const HeldSystem>(soft_->added_to(operators.laplacian),
+                                                  firm_vertices, prepared_->symbolic);
   }
   progress.report(0.5);
   volume_ = former == nullptr ? std::make_shared<const EnclosedVolume>(operators) : former->volume_;
   interpolation_ = std::make_shared<const BiharmonicInterpolation>(
       prepared_->pinned(), std::move(points),
-      former == nullptr ? nullptr : former->interpolation_.get());
+      former == nullptr ? nullptr : former->interpolation_.get(),
+      compliances(handles_, guides_, held_handle_));
 }
 
 }  // namespace supple

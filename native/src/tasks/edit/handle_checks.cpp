@@ -21,6 +21,11 @@ void check_handles(const std::vector<Handle>& handles, Eigen::Index vertex_count
       throw Error(ErrorCode::empty_handle,
                   "Handle '" + handle.name + "' has no vertices. Give it some or remove it.");
     }
+    if (!(handle.weight > 0.0 && handle.weight <= 1.0)) {
+      throw Error(ErrorCode::bad_option,
+                  "Handle '" + handle.name + "' has the weight " + std::to_string(handle.weight) +
+                      ". Give it more than 0 and at most 1, which holds it exactly.");
+    }
     for (const int vertex : handle.vertices) {
       if (vertex < 0 || vertex >= vertex_count) {
         throw Error(ErrorCode::index_out_of_range,

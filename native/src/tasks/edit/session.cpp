@@ -5,6 +5,7 @@
 #include "descent.h"
 #include "handle_checks.h"
 #include "rounds.h"
+#include "soft_handles.h"
 #include "suggestion.h"
 #include "supple/core/error.h"
 #include "supple/geometry/jacobians.h"
@@ -83,8 +84,8 @@ struct EditSession::State {
                             const std::vector<std::optional<Matrix3>>& known);
   Points smooth_displacement() const;
   void suggest();
-  /// Adds what the residual of the Poisson equation leaves to be done.
-  void correct(const Points& residual);
+  /// Adds what the residual of the Poisson equation and the soft handles' pulls leave to be done.
+  void correct(Points residual);
   void round(bool use_network);
   void polish_pass();
   void pass();
@@ -97,12 +98,14 @@ struct EditSession::State {
 
   Points positions;  // of every handle vertex in handle order, caller's units
   Points held;       // of editor->held_, surface units
+  Points soft_targets;  // those of them that are soft
   RigidMotion whole;
   std::vector<Matrix3> guide_rotations;
   Points moved;
   MatrixField stretch;            // of the last round with the network
   Eigen::VectorXi volume_counts;  // a component: 1 where its volume is kept
   std::unique_ptr<DeformationEnergy> energy;
+  std::unique_ptr<PulledEnergy> pulled;  // with the soft handles
   std::unique_ptr<Descent> descent;
   int stiffenings = 0;
   int next = 0;  // step
@@ -147,9 +150,12 @@ void EditSession::State::aim(const std::vector<HandleTarget>& targets) {
       held.row(e.held_slot_[i]) = on_surface.row(i);
     }
   }
+  soft_targets = held(e.soft_->places, Eigen::all);
   Points handles_rest(e.handle_rows_, 3);
+  Eigen::VectorXd weights(e.handle_rows_);
   for (Eigen::Index i = 0; i < e.handle_rows_; ++i) {
     handles_rest.row(i) = rest.row(e.held_[i]);
+    weights[i] = e.handles_[static_cast<size_t>(e.held_handle_[i])].weight;
   }
   const Matrix3 identity = Matrix3::Identity();
   std::vector<Matrix3> turns;
@@ -157,10 +163,10 @@ void EditSession::State::aim(const std::vector<HandleTarget>& targets) {
   for (size_t h = 0; h < targets.size(); ++h) {
     if (!targets[h].positions) {
       known[h] = targets[h].matrix ? row_rotation(*targets[h].matrix) : identity;
-      turns.push_back(*known[h]);
+      turns.push_back(e.handles_[h].weight * *known[h]);
     }
   }
-  whole = nearest_motion(handles_rest, held.topRows(e.handle_rows_), turns);
+  whole = nearest_motion(handles_rest, held.topRows(e.handle_rows_), weights, turns);
   // Loose pieces go with the whole in the solves, so that one rigid motion of all stays one.
   for (Eigen::Index i = e.handle_rows_; i < held.rows(); ++i) {
     held.row(i) = whole(rest.row(e.held_[i]));
@@ -168,6 +174,7 @@ void EditSession::State::aim(const std::vector<HandleTarget>& targets) {
 
   find_guide_rotations(handles_rest, known);
   descent.reset();
+  pulled.reset();
   energy.reset();
   stretch.resize(0, 9);
   stiffenings = 0;
@@ -251,13 +258,14 @@ void EditSession::State::suggest() {
   for (Eigen::Index v = 0; v < moved.rows(); ++v) {
     moved.row(v) = whole(rest.row(v));
   }
-  for (Eigen::Index i = 0; i < held.rows(); ++i) {
-    moved.row(editor->held_[i]) = held.row(i);
+  for (const int place : editor->firm_) {
+    moved.row(editor->held_[place]) = held.row(place);
   }
   correct(towards(operators(), moved, rotations));
 }
 
-void EditSession::State::correct(const Points& residual) {
+void EditSession::State::correct(Points residual) {
+  editor->soft_->add_residual(moved, soft_targets, residual);
   moved += editor->poisson_->correction(residual);
 }
 
@@ -288,7 +296,8 @@ void EditSession::State::pass() {
     } else {
       energy = std::make_unique<ArapEnergy>(operators());
     }
-    descent = std::make_unique<Descent>(*energy, *editor->poisson_);
+    pulled = std::make_unique<PulledEnergy>(*energy, *editor->soft_, soft_targets);
+    descent = std::make_unique<Descent>(*pulled, *editor->poisson_);
   }
   descent->pass(moved);
   ++report.passes;
@@ -367,7 +376,10 @@ EditResult EditSession::State::result() const {
   Eigen::Index row = 0;
   for (const Handle& handle : editor->handles_) {
     for (const int vertex : handle.vertices) {
-      result.vertices.row(vertex) = positions.row(row++);
+      if (handle.weight == 1.0) {
+        result.vertices.row(vertex) = positions.row(row);
+      }
+      ++row;
     }
   }
   result.report = report;

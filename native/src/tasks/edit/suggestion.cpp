@@ -9,13 +9,14 @@
 
 namespace supple {
 
-RigidMotion nearest_motion(const Points& rest, const Points& moved,
+RigidMotion nearest_motion(const Points& rest, const Points& moved, const Eigen::VectorXd& weights,
                            const std::vector<Matrix3>& turns) {
   constexpr double kRadius = 0.1;
   RigidMotion motion;
-  motion.from = rest.colwise().mean();
-  motion.to = moved.colwise().mean();
-  Matrix3 correlation = (rest.rowwise() - motion.from).transpose() * (moved.rowwise() - motion.to);
+  motion.from = weights.transpose() * rest / weights.sum();
+  motion.to = weights.transpose() * moved / weights.sum();
+  Matrix3 correlation = (rest.rowwise() - motion.from).transpose() * weights.asDiagonal() *
+                        (moved.rowwise() - motion.to);
   for (const Matrix3& turn : turns) {
     correlation += kRadius * kRadius * turn;
   }
