@@ -179,6 +179,7 @@ def test_object_of_the_open_file_saved_over_itself(addon, tmp_path):
         ("[input]", "[inputs]", "job.toml: inputs: unknown"),
         ("held = true", 'held = "yes"', r"handles\[0\].held: must be a true or false, not 'yes'"),
         ("held = true", "", r"handles\[0\].group: 'feet' needs one of: held = true, matrix"),
+        ("held = true", "held = true\nweight = 0", r"handles\[0\].weight: must be more than 0"),
         ("degrees = 90", "degrees = true", r"handles\[1\].rotate.degrees: must be a number"),
         ("[0, 2, 0]", "[0, 0, 0]", r"handles\[1\].rotate.axis: .* not all 0"),
         ("[0.3, 0.0, 0.1]", "[0.3, 0.0]", r"handles\[1\].translate: must be 3 finite numbers"),

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What was computed once for a mesh and its handles, kept in memory; meshes also on disk.
 
-Entries are found by their content (geometry, handle vertices and weights), so that a changed mesh, an undo,
-a renamed object or another file can never meet a stale one.
+Entries are found by their content (geometry, handle vertices and weights), so that a changed mesh,
+an undo, a renamed object or another file can never meet a stale one.
 """
 
 import hashlib

@@ -115,7 +115,7 @@ class Editor:
         """An editor of the same mesh and network with other handles: added, removed or changed.
 
         What the two share is not computed again, so a few vertices more or less take milliseconds.
-        The result is the same as that of a new Editor.
+        The result is the same as that of a new Editor, to single precision.
 
         Raises:
             SuppleError: as for Editor.

@@ -2,6 +2,8 @@
 // Handles of a weight below 1: they pull, and the mesh resists.
 #include "tasks/edit/soft_handles.h"
 
+#include <Eigen/Geometry>
+
 #include "native/gradient_check.h"
 #include "native/tasks/editing.h"
 
@@ -110,7 +112,7 @@ TEST_F(SoftHandlesTest, ArapEndsWhereItsForceAndThePullAreEqual) {
     force.row(v) += 2.0 * pull_of(0.5) * prepared->operators.mass[v] / mass *
                     (moved.row(v) - surface_goal.row(0));
   }
-  EXPECT_GT(uncompensated, 0.1);
+  EXPECT_GT(uncompensated, 0.05);
   EXPECT_LT(force.norm(), 5e-3 * uncompensated);
 }
 

@@ -88,7 +88,7 @@ class Editor {
  public:
   /// network: nullptr to edit without one (the closest rotations themselves are the Jacobians).
   /// former: an editor of the same prepared mesh with other handles; what the two share is not
-  /// computed again, and the result is the same to rounding.
+  /// computed again, and the result is the same to single precision.
   /// Errors: `no_handles`, `empty_handle`, `index_out_of_range`, `overlapping_handles`;
   /// `bad_option` for a weight outside of ]0, 1] or if the network takes another signal. Messages
   /// name the handle.

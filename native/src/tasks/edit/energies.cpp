@@ -130,7 +130,7 @@ double StiffEnergy::add_volume(const Points& moved, Points& gradient) const {
   Eigen::VectorXd factor = Eigen::VectorXd::Zero(rest.size());
   double value = 0.0;
   for (Eigen::Index c = 0; c < rest.size(); ++c) {
-    if (counts_[c] != 0) {
+    if (counts_[c] != 0 && rest[c] > 0.0) {
       const double change = now[c] / rest[c] - 1.0;
       value += kVolume * change * change;
       factor[c] = 2.0 * kVolume * change / rest[c];

@@ -15,7 +15,7 @@ using initial_maps::MeshPair;
 
 constexpr Eigen::Index kFitted = 20;  // functions of the first maps
 constexpr Eigen::Index kFirstStep = 1, kStep = 4;
-constexpr Eigen::Index kFirstSamples = 300;
+constexpr Eigen::Index kFirstSamples = 600;
 constexpr Eigen::Index kLeast = 8;
 constexpr int kSignatures = 40;
 constexpr int kSigns = 5;          // functions whose signs are tried, beside the constant
