@@ -52,13 +52,13 @@ class SUPPLE_UL_handles(bpy.types.UIList):
         ).name = item.name
 
 
-class _Sidebar:
+class Sidebar:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Supple"
 
 
-class SUPPLE_PT_mesh(_Sidebar, bpy.types.Panel):
+class SUPPLE_PT_mesh(Sidebar, bpy.types.Panel):
     bl_label = "Mesh"
 
     def draw(self, context):
@@ -86,7 +86,7 @@ class SUPPLE_PT_mesh(_Sidebar, bpy.types.Panel):
             _draw_text(layout, note, "INFO")
 
 
-class SUPPLE_PT_pose(_Sidebar, bpy.types.Panel):
+class SUPPLE_PT_pose(Sidebar, bpy.types.Panel):
     bl_label = "Pose"
 
     @classmethod
@@ -161,7 +161,7 @@ class SUPPLE_PT_pose(_Sidebar, bpy.types.Panel):
             layout.prop(obj.supple, "overwrite", text=f"Overwrite '{name}'")
 
 
-class _PoseSettings(_Sidebar):
+class _PoseSettings(Sidebar):
     bl_parent_id = "SUPPLE_PT_pose"
     bl_options = {"DEFAULT_CLOSED"}
 
