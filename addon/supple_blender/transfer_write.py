@@ -83,18 +83,20 @@ def write(context, source, target, layers, options):
         fitted.write(context, source, target, layers.fit)
 
 
+def counts(layers):
+    """Return what Layers hold in words, such as ['2 UV maps']."""
+    kinds = (
+        (layers.uvs, "UV map", "UV maps"),
+        (layers.weights, "vertex group", "vertex groups"),
+        (layers.colours, "colour attribute", "colour attributes"),
+        (layers.keys, "shape key", "shape keys"),
+    )
+    return [count(len(values), one, many) for values, one, many in kinds if values]
+
+
 def summary(source, target, layers):
     """Return in words what was carried."""
-    parts = [
-        count(len(values), one, many)
-        for values, one, many in (
-            (layers.uvs, "UV map", "UV maps"),
-            (layers.weights, "vertex group", "vertex groups"),
-            (layers.colours, "colour attribute", "colour attributes"),
-            (layers.keys, "shape key", "shape keys"),
-        )
-        if values
-    ]
+    parts = counts(layers)
     said = [f"{target.name}: {', '.join(parts)} carried from '{source.name}'"] if parts else []
     if layers.fit is not None:
         said.append(f"made '{fitted.name_of(source, target)}'")
