@@ -405,3 +405,18 @@ def test_to_many_with_a_bad_one(pair):
     select(body)
     with pytest.raises(RuntimeError, match=r"Body: no other mesh is selected"):
         bpy.ops.supple.match_transfer_many()
+
+
+def test_without_operators(addon):
+    api = addon("api")
+    body = pairs.dress(pairs.add_lump())
+    scan, order = pairs.add_shuffled(body)
+    found = api.match(body, scan, "NEAREST", refine=False)
+    assert found.confidence.mean() > 0.9
+    assert api.match(body, scan, "CURRENT").confidence.shape == (610,)
+    api.match(body, scan, "NEAREST", refine=False)
+    layers = api.transfer(body, scan, {"UVS", "KEYS"})
+    assert list(layers.uvs) == ["Map"] and [key.name for key in layers.keys] == ["Bend", "Half"]
+    assert_same_uvs(body, scan, order)
+    with pytest.raises(api.UserError, match=r"There is no start 'LUCK'"):
+        api.match(body, scan, "LUCK")

@@ -21,6 +21,7 @@ VERSION = bl_info["version"]
 from . import (  # noqa: E402
     compat,
     handle_operators,
+    landmark_click,
     landmark_operators,
     live_operators,
     match_operators,
@@ -37,7 +38,7 @@ from . import (  # noqa: E402
 _MODULES = (
     *(preferences, properties, pose_operators, handle_operators, live_operators, panel),
     *(match_properties, match_operators, match_view_operators, landmark_operators),
-    *(transfer_operators, match_panel),
+    *(landmark_click, transfer_operators, match_panel),
 )
 _cli_commands = []
 

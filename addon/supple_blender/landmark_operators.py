@@ -11,20 +11,19 @@ from .match_view_operators import selected_vertex
 
 
 def require_new(settings, source, target, source_vertex, target_vertex):
-    """Raise UserError where a vertex is not there or is in a row already."""
-    for obj, vertex in ((source, source_vertex), (target, target_vertex)):
+    """Raise UserError where a vertex is not there or is in a row already; None is not asked for."""
+    given = ((source, source_vertex, "source_vertex"), (target, target_vertex, "target_vertex"))
+    for obj, vertex, which in given:
+        if vertex is None:
+            continue
         if not 0 <= vertex < len(obj.data.vertices):
-            raise UserError(
-                f"{obj.name}: it has no vertex {vertex}; its last is {len(obj.data.vertices) - 1}."
-            )
-    for number, row in enumerate(settings.pairs, 1):
-        for obj, new, old in (
-            (source, source_vertex, row.source_vertex),
-            (target, target_vertex, row.target_vertex),
-        ):
-            if new == old:
+            last = len(obj.data.vertices) - 1
+            raise UserError(f"{obj.name}: it has no vertex {vertex}; its last is {last}.")
+        for number, row in enumerate(settings.pairs, 1):
+            if getattr(row, which) == vertex:
                 raise UserError(
-                    f"{obj.name}: vertex {new} is in pair {number} already. Remove that pair first."
+                    f"{obj.name}: vertex {vertex} is in pair {number} already. "
+                    "Remove that pair first."
                 )
 
 

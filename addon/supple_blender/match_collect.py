@@ -9,7 +9,7 @@ import numpy as np
 
 from . import compat, handles, match_map, mesh_data
 from .errors import UserError
-from .match import MatchInput
+from .match import STARTS, MatchInput
 
 
 @dataclass(frozen=True)
@@ -126,6 +126,8 @@ def _file(options, target):
 def collect(context, source, target, options):
     """Return the MatchInput for mesh objects source and target."""
     require_pair(source, target)
+    if options.start not in STARTS:
+        raise UserError(f"There is no start '{options.start}'. The starts are {', '.join(STARTS)}.")
     rests = [rest_of(context, obj) for obj in (source, target)]
     given = {}
     if options.start == "NEAREST":

@@ -4,6 +4,7 @@
 import bpy
 
 from . import background, match_collect, match_map, match_show, native
+from .landmark_click import SUPPLE_OT_landmark_click
 from .landmark_operators import (
     SUPPLE_OT_landmark_add,
     SUPPLE_OT_landmark_remove,
@@ -20,15 +21,14 @@ from .match_view_operators import SUPPLE_OT_match_partner, SUPPLE_OT_match_show
 from .panel import Sidebar
 from .transfer_operators import SUPPLE_OT_match_transfer_many, SUPPLE_OT_transfer
 
+LABEL_WIDTH = 0.27  # of the sidebar
+
 
 class SUPPLE_UL_pairs(bpy.types.UIList):
     """One row a pair: its number and the two vertices."""
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index):
-        row = layout.row(align=True)
-        row.label(text=f"{index + 1}")
-        row.label(text=f"{item.source_vertex}", icon="VERTEXSEL")
-        row.label(text=f"{item.target_vertex}", icon="FORWARD")
+        layout.label(text=f"{index + 1}:  {item.source_vertex} - {item.target_vertex}")
 
 
 class SUPPLE_PT_match(Sidebar, bpy.types.Panel):
@@ -57,25 +57,26 @@ class SUPPLE_PT_match(Sidebar, bpy.types.Panel):
             self._draw_map(layout, target)
 
     def _draw_objects(self, layout, settings, source, target):
-        row = layout.row(align=True)
-        column = row.column(align=True)
         for name, obj in (("source", source), ("target", target)):
-            field = column.split(factor=0.25, align=True)
-            field.label(text=name.title())
-            field.prop(settings, name, text="")
+            row = self._labelled(layout, name.title())
+            row.prop(settings, name, text="")
+            if name == "target":
+                row.operator(SUPPLE_OT_match_swap.bl_idname, text="", icon="FILE_REFRESH")
             if getattr(settings, name) is None and obj is not None:
-                hint = column.split(factor=0.25, align=True)
-                hint.label(text="")
-                hint.label(text=f"{obj.name}, which is selected")
-        row.operator(SUPPLE_OT_match_swap.bl_idname, text="", icon="FILE_REFRESH")
+                self._labelled(layout, "").label(text=f"{obj.name}, selected")
+
+    def _labelled(self, layout, text):
+        """Return a row of the layout with a label before it."""
+        split = layout.split(factor=LABEL_WIDTH, align=True)
+        split.label(text=text)
+        return split.row(align=True)
 
     def _draw_start(self, layout, settings):
-        row = layout.split(factor=0.25, align=True)
-        row.label(text="Start")
-        row.prop(settings, "start", text="")
+        self._labelled(layout, "Start").prop(settings, "start", text="")
         if settings.start == "FILE":
             layout.prop(settings, "file", text="")
         if settings.start == "LANDMARKS":
+            layout.operator(SUPPLE_OT_landmark_click.bl_idname, icon="RESTRICT_SELECT_OFF")
             row = layout.row()
             row.template_list(
                 "SUPPLE_UL_pairs", "", settings, "pairs", settings, "active_pair", rows=3
