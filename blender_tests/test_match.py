@@ -95,6 +95,17 @@ def test_another_triangulation():
     assert np.linalg.norm(pairs.partners(scan, body) - truth, axis=1).mean() < 0.08
 
 
+def test_a_shape_that_fits_two_ways_is_told():
+    """A lump is nearly symmetric: the report says so, and the panel keeps it."""
+    body, scan = pairs.add_lump(), pairs.add_lump("Scan", 41, 23)
+    pairs.choose(body, scan, "AUTOMATIC")
+    bpy.ops.supple.match()
+    assert "the shapes may be symmetric" in scan.supple_map.notes
+    pairs.choose(body, scan, "NEAREST")
+    bpy.ops.supple.match()
+    assert scan.supple_map.notes == ""
+
+
 def test_refining_makes_a_rough_match_better(pair):
     body, scan, _ = pair
     pairs.choose(body, scan, refine=False)
@@ -334,6 +345,12 @@ def test_bad_input(pair):
     scan.data.vertices[0].co.x = float("nan")
     with pytest.raises(RuntimeError, match=r"Scan: 1 vertex has a position that is not a number"):
         bpy.ops.supple.match()
+
+
+def test_a_deleted_object_is_told(pair):
+    pairs.choose(pair[0], pair[1])
+    bpy.context.scene.collection.objects.unlink(pair[0])
+    refuse("Body: it was deleted from the scene. Choose another object")
 
 
 def test_a_shared_target_is_refused_and_a_shared_source_is_not(pair):

@@ -380,6 +380,24 @@ def test_a_changed_mesh_is_refused(pair):
     refuse("Body: it was changed since the match. Match again", "UVS")
 
 
+def test_imperfect_meshes():
+    """Loose vertices, a hole and an edge of three faces, on both sides."""
+    uv, faces, _ = pairs.lump()
+    points = np.concatenate([pairs.place(*uv.T), [(5, 5, 5), (6, 6, 6)]])
+    faces = [*faces[:300], *faces[303:], [2, 3, 4]]  # a hole, and a face that leaves the surface
+    body = bodies.add_mesh("Body", points, faces)
+    bodies.add_group(body, "all", range(len(points)))
+    body.data.uv_layers.new(name="Map")
+    scan, order = pairs.add_shuffled(body)
+    pairs.choose(body, scan)
+    bpy.ops.supple.match()
+    transfer("UVS", "WEIGHTS", "FIT")
+    on_faces = sorted({int(v) for p in scan.data.polygons for v in p.vertices})
+    assert np.abs(weights(scan)[1][on_faces] - 1).max() < 1e-5
+    error = np.linalg.norm(pairs.partners(scan, body) - bodies.rest(body)[order], axis=1)
+    assert error[on_faces].mean() < 0.05
+
+
 def select(*objects):
     for obj in bpy.data.objects:
         obj.select_set(obj in objects)

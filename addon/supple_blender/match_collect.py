@@ -44,11 +44,15 @@ def source_chosen(context):
     return context.scene.supple_match.source or context.view_layer.objects.active
 
 
+def other_meshes(context, source):
+    """Return the selected mesh objects but the source."""
+    return [obj for obj in context.selected_objects if obj.type == "MESH" and obj != source]
+
+
 def target_chosen(context):
     """Return the object that is the target now: the one chosen, the other one selected, or None."""
     chosen = context.scene.supple_match.target
-    source = source_chosen(context)
-    others = [o for o in context.selected_objects if o.type == "MESH" and o != source]
+    others = other_meshes(context, source_chosen(context))
     return chosen or (others[0] if len(others) == 1 else None)
 
 
@@ -63,6 +67,8 @@ def require_pair(source, target):
         )
     for obj in (source, target):
         mesh_data.require_mesh(obj)
+        if not obj.users_scene:
+            raise UserError(f"{obj.name}: it was deleted from the scene. Choose another object.")
     if source == target:
         raise UserError(f"{source.name}: it is both source and target. Choose two objects.")
     match_map.require_writable(target)

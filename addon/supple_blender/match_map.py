@@ -48,6 +48,7 @@ def write(target, source, source_rest, target_rest, match):
     kept.source = source
     kept.source_digest, kept.target_digest = shape_of(source_rest), shape_of(target_rest)
     kept.confidence = float(match.confidence.mean())
+    kept.notes = " ".join(match.notes)
 
 
 def require(target, source, source_rest, target_rest):
@@ -89,3 +90,4 @@ def remove(target):
     kept.source = None
     kept.source_digest = kept.target_digest = ""
     kept.confidence = 0.0
+    kept.notes = ""

@@ -38,7 +38,7 @@ class MatchOperator(LongOperator):
         verb = "refined" if inputs.start == "CURRENT" else "matched"
         confidence = f"confidence {target.supple_map.confidence:.2f}"
         text = f"{target.name}: {verb} to '{source.name}', {confidence}"
-        return "INFO", ". ".join([text, *result.notes])
+        return ("WARNING" if result.notes else "INFO"), ". ".join([text, *result.notes])
 
 
 class SUPPLE_OT_match(MatchOperator, bpy.types.Operator):

@@ -18,7 +18,7 @@ from .match_operators import (
     SUPPLE_OT_refine_match,
 )
 from .match_view_operators import SUPPLE_OT_match_partner, SUPPLE_OT_match_show
-from .panel import Sidebar
+from .panel import Sidebar, draw_text
 from .transfer_operators import SUPPLE_OT_match_transfer_many, SUPPLE_OT_transfer
 
 LABEL_WIDTH = 0.27  # of the sidebar
@@ -72,7 +72,9 @@ class SUPPLE_PT_match(Sidebar, bpy.types.Panel):
         return split.row(align=True)
 
     def _draw_start(self, layout, settings):
-        self._labelled(layout, "Start").prop(settings, "start", text="")
+        row = self._labelled(layout, "Start")
+        row.prop(settings, "start", text="")
+        row.operator(SUPPLE_OT_match_load.bl_idname, text="", icon="IMPORT")
         if settings.start == "FILE":
             layout.prop(settings, "file", text="")
         if settings.start == "LANDMARKS":
@@ -94,8 +96,9 @@ class SUPPLE_PT_match(Sidebar, bpy.types.Panel):
         show.show = not shown
         row.operator(SUPPLE_OT_match_partner.bl_idname, text="Partner", icon="PIVOT_CURSOR")
         row.operator(SUPPLE_OT_match_save.bl_idname, text="", icon="EXPORT")
-        row.operator(SUPPLE_OT_match_load.bl_idname, text="", icon="IMPORT")
         layout.label(text=f"Confidence {target.supple_map.confidence:.2f}")
+        if target.supple_map.notes:
+            draw_text(layout, target.supple_map.notes, "ERROR")
 
 
 class SUPPLE_PT_transfer(Sidebar, bpy.types.Panel):

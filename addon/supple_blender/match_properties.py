@@ -107,6 +107,7 @@ class SUPPLE_PG_map(bpy.types.PropertyGroup):
     source_digest: StringProperty(description="The source's shape when it was matched")
     target_digest: StringProperty(description="The target's shape when it was matched")
     confidence: FloatProperty(name="Confidence", description="The mean over all vertices")
+    notes: StringProperty(description="What to know about the match")
     made: CollectionProperty(type=SUPPLE_PG_made)
 
 

@@ -62,7 +62,7 @@ class SUPPLE_OT_match_transfer_many(LongOperator, bpy.types.Operator):
 
     def collect(self, context):
         source = match_collect.source_chosen(context)
-        targets = [obj for obj in context.selected_objects if obj != source]
+        targets = match_collect.other_meshes(context, source)
         return match_batch.collect(
             context,
             source,
