@@ -4,6 +4,7 @@
 import bodies
 import bpy
 import numpy as np
+import pytest
 
 
 def place(u, v):
@@ -170,3 +171,64 @@ def everything():
     state["panel"] = (panel.source, panel.target, panel.start, rows, panel.overwrite)
     state["meshes"] = sorted(mesh.name for mesh in bpy.data.meshes)
     return state
+
+
+def bare_pair():
+    """Add a body and its copy in another order; return both and that order."""
+    body = add_lump()
+    return body, *add_shuffled(body)
+
+
+def dressed_pair():
+    """As bare_pair, with layers on the body, and matched exactly."""
+    body = dress(add_lump())
+    scan, order = add_shuffled(body)
+    choose(body, scan, refine=False)
+    bpy.ops.supple.match()
+    return body, scan, order
+
+
+def match_error(target, source, order):
+    """Return the mean distance of the map kept on target from the truth; a lump is about 4 long."""
+    truth = bodies.rest(source)[order]
+    return float(np.linalg.norm(partners(target, source) - truth, axis=1).mean())
+
+
+def refuse(operator, match):
+    """Assert that the operator reports an error that matches, and that the file stays as it was."""
+    before = everything()
+    with pytest.raises(RuntimeError, match=match) as caught:
+        operator()
+    assert "Traceback" not in str(caught.value)
+    assert everything() == before
+
+
+def transfer(*parts, **settings):
+    panel = bpy.context.scene.supple_match
+    panel.transfer = set(parts)
+    for name, value in settings.items():
+        setattr(panel, name, value)
+    return bpy.ops.supple.transfer()
+
+
+def weights(obj):
+    names = [group.name for group in obj.vertex_groups]
+    found = np.zeros((len(obj.data.vertices), len(names)))
+    for vertex in obj.data.vertices:
+        for element in vertex.groups:
+            found[vertex.index, element.group] = element.weight
+    return names, found
+
+
+def is_pole(body, face):
+    """Return whether a face is one of a lump's fans, whose edges all are seams at the pole."""
+    return len(body.data.vertices) == 610 and not {0, 1}.isdisjoint(face)
+
+
+def assert_same_uvs(body, scan, order):
+    truth = uv_by_corner(body)
+    for (face, vertex), uv in uv_by_corner(scan).items():
+        if is_pole(body, [int(order[v]) for v in face]):
+            continue
+        wanted = truth[frozenset(int(order[v]) for v in face), int(order[vertex])]
+        assert np.abs(uv - wanted).max() < 2e-3, (face, vertex, uv, wanted)
