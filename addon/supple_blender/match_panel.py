@@ -61,7 +61,7 @@ class SUPPLE_PT_match(Sidebar, bpy.types.Panel):
             row = self._labelled(layout, name.title())
             row.prop(settings, name, text="")
             if name == "target":
-                row.operator(SUPPLE_OT_match_swap.bl_idname, text="", icon="FILE_REFRESH")
+                row.operator(SUPPLE_OT_match_swap.bl_idname, text="", icon="ARROW_LEFTRIGHT")
             if getattr(settings, name) is None and obj is not None:
                 self._labelled(layout, "").label(text=f"{obj.name}, selected")
 
@@ -87,7 +87,7 @@ class SUPPLE_PT_match(Sidebar, bpy.types.Panel):
             column.operator(SUPPLE_OT_landmark_add.bl_idname, text="", icon="ADD")
             column.operator(SUPPLE_OT_landmark_remove.bl_idname, text="", icon="REMOVE")
             column.operator(SUPPLE_OT_landmarks_clear.bl_idname, text="", icon="X")
-        layout.prop(settings, "refine")
+        layout.prop(settings, "refine", text="Match, then refine")
 
     def _draw_map(self, layout, target):
         row = layout.row(align=True)
