@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 import pairs
 import pytest
+import refusing
 
 
 @pytest.fixture
@@ -14,7 +15,7 @@ def pair():
 
 
 def refuse(match):
-    pairs.refuse(bpy.ops.supple.match, match)
+    refusing.refuse(bpy.ops.supple.match, match)
 
 
 def test_bad_input(pair):
@@ -28,7 +29,7 @@ def test_bad_input(pair):
     pairs.choose(body, scan, "LANDMARKS")
     refuse("Scan: there are no landmarks. Select a vertex of each")
     bpy.context.scene.supple_match.pairs.add().source_vertex = 5000
-    pairs.refuse(
+    refusing.refuse(
         bpy.ops.supple.match,
         "Body: pair 1 names vertex 5000, but it has 610 vertices. Remove that pair",
     )
@@ -58,7 +59,7 @@ def test_a_shared_target_is_refused_and_a_shared_source_is_not(pair):
     other = bpy.data.objects.new("Twin", scan.data)
     bpy.context.scene.collection.objects.link(other)
     pairs.choose(body, scan, refine=False)
-    pairs.refuse(
+    refusing.refuse(
         bpy.ops.supple.match,
         "Scan: its mesh 'Scan' is shared by 2 users. Make it single-user first",
     )
@@ -70,7 +71,7 @@ def test_an_attribute_of_the_same_name_is_kept(pair):
     body, scan, _ = pair
     scan.data.attributes.new("Supple Confidence", "INT", "FACE")
     pairs.choose(body, scan)
-    pairs.refuse(
+    refusing.refuse(
         bpy.ops.supple.match,
         "Scan: it has an attribute 'Supple Confidence' of another kind. Rename or remove it",
     )

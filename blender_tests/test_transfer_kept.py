@@ -5,6 +5,7 @@ import bodies
 import bpy
 import pairs
 import pytest
+import refusing
 
 
 @pytest.fixture
@@ -17,7 +18,7 @@ PARTS = ("UVS", "WEIGHTS", "COLOURS", "KEYS")
 
 def refuse(match, *parts):
     bpy.context.scene.supple_match.transfer = set(parts)
-    pairs.refuse(bpy.ops.supple.transfer, match)
+    refusing.refuse(bpy.ops.supple.transfer, match)
 
 
 def test_what_supple_made_is_written_again(pair):
