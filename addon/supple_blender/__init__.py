@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Supple for Blender: pose a mesh by its vertex groups and bake the result to a shape key.
+"""Supple for Blender: pose meshes by their vertex groups, match them, carry what they have across.
 
 `supple_blender.api` (in an extension: `bl_ext.user_default.supple.api`) is the Python interface;
 the operators `bpy.ops.supple.*` and the sidebar tab "Supple" are thin layers over it.
@@ -11,7 +11,7 @@ bl_info = {
     "version": (0, 0, 0),
     "blender": (3, 4, 0),
     "location": "View3D > Sidebar > Supple",
-    "description": "Pose a mesh by its vertex groups, keep its detail, bake shape keys",
+    "description": "Pose meshes by vertex groups, keep their detail, match and transfer",
     "category": "Mesh",
 }
 
@@ -21,14 +21,25 @@ VERSION = bl_info["version"]
 from . import (  # noqa: E402
     compat,
     handle_operators,
+    landmark_click,
+    landmark_operators,
     live_operators,
+    match_operators,
+    match_panel,
+    match_properties,
+    match_view_operators,
     panel,
     pose_operators,
     preferences,
     properties,
+    transfer_operators,
 )
 
-_MODULES = (preferences, properties, pose_operators, handle_operators, live_operators, panel)
+_MODULES = (
+    *(preferences, properties, pose_operators, handle_operators, live_operators, panel),
+    *(match_properties, match_operators, match_view_operators, landmark_operators),
+    *(landmark_click, transfer_operators, match_panel),
+)
 _cli_commands = []
 
 

@@ -6,6 +6,10 @@
     bpy.data.objects["hand.L"].location.z += 0.3
     api.bake(obj, "Wave")
 
+    scan = bpy.data.objects["Scan"]
+    api.match(obj, scan)
+    api.transfer(obj, scan, {"UVS", "WEIGHTS"})
+
 Every function raises `UserError` with one readable message and then leaves the file as it was.
 Where one takes `stages` (a `stages.Stages`), another thread may watch it and call its `cancel()`:
 then `CancelledError` is raised, and again nothing was changed. Call them from the main thread.
@@ -13,7 +17,21 @@ then `CancelledError` is raised, and again nothing was changed. Call them from t
 
 import bpy
 
-from . import collecting, handles, mesh_data, motions, native, pose, shape_keys
+from . import (
+    collecting,
+    handles,
+    match_collect,
+    match_solving,
+    mesh_data,
+    motions,
+    native,
+    pose,
+    shape_keys,
+    transfer_collect,
+    transfer_write,
+)
+from . import match as matching
+from . import transfer as carrying
 from .errors import CancelledError, UserError, count
 from .stages import Stages
 
@@ -24,10 +42,12 @@ __all__ = [
     "check_mesh",
     "collect_pose",
     "handles_from_groups",
+    "match",
     "prepare",
     "rebind",
     "rest_mesh",
     "solve",
+    "transfer",
 ]
 
 
@@ -79,6 +99,33 @@ def bake(obj, name, overwrite=False, stages=None):
     result = solve(obj, stages)
     shape_keys.write(obj, name, result.positions)
     return result
+
+
+def match(source, target, start="AUTOMATIC", refine=True, landmarks=(), file="", stages=None):
+    """Find where target's vertices belong on source, and keep that on target; return the Match.
+
+    start: "AUTOMATIC", "LANDMARKS" (with `landmarks`: pairs of a source and a target vertex),
+    "NEAREST", "ALIGNED", "UVS", "FILE" (with `file`), or "CURRENT" to refine what target keeps.
+    """
+    options = match_collect.Options(start, refine, tuple(landmarks), str(file))
+    inputs = match_collect.collect(bpy.context, source, target, options)
+    found = matching.solve(inputs, stages or Stages())
+    match_solving.keep(bpy.context, source, target, inputs, found)
+    return found
+
+
+def transfer(
+    source, target, parts, only_active_key=False, drivers=False, overwrite=False, stages=None
+):
+    """Carry `parts` of source along the match that target keeps; return what target got.
+
+    parts: a set of "UVS", "WEIGHTS", "COLOURS", "KEYS", "FIT". The result is `transfer.Layers`.
+    """
+    options = transfer_collect.Options(frozenset(parts), only_active_key, drivers, overwrite)
+    inputs, _ = transfer_collect.collect(bpy.context, source, target, options)
+    layers = carrying.solve(inputs, stages or Stages()).layers
+    transfer_write.write(bpy.context, source, target, layers, options)
+    return layers
 
 
 def check_mesh(obj):

@@ -4,6 +4,9 @@
 import bpy
 import numpy as np
 
+# Options of a file's property that may start with "//"; from 4.5 on Blender wants to be told.
+RELATIVE_PATH = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
+
 
 def read_key(key):
     """Return the positions of a shape key, (n, 3) float32."""
@@ -33,6 +36,46 @@ def add_key(obj, name):
     key = obj.shape_key_add(name=name, from_mix=False)
     key.value = 1.0
     return key
+
+
+def read_uvs(layer):
+    """Return the UVs of a UV map, (corners, 2) float32."""
+    data, name = (layer.uv, "vector") if hasattr(layer, "uv") else (layer.data, "uv")  # from 3.5 on
+    uvs = np.empty(2 * len(data), dtype=np.float32)
+    data.foreach_get(name, uvs)
+    return uvs.reshape(-1, 2)
+
+
+def write_uvs(layer, uvs):
+    """Set the UVs of a UV map; uvs is (corners, 2)."""
+    data, name = (layer.uv, "vector") if hasattr(layer, "uv") else (layer.data, "uv")
+    data.foreach_set(name, np.ascontiguousarray(uvs, dtype=np.float32).reshape(-1))
+
+
+# How an attribute's values are called, their length and their NumPy type.
+_ATTRIBUTES = {
+    "INT": ("value", 1, np.int32),
+    "FLOAT": ("value", 1, np.float32),
+    "FLOAT_VECTOR": ("vector", 3, np.float32),
+    "FLOAT_COLOR": ("color", 4, np.float32),
+    "BYTE_COLOR": ("color", 4, np.float32),
+}
+
+
+def read_attribute(attribute):
+    """Return the values of an attribute, (n,) or (n, k); int32 or float64, colours linear."""
+    name, length, kind = _ATTRIBUTES[attribute.data_type]
+    values = np.empty(length * len(attribute.data), dtype=kind)
+    attribute.data.foreach_get(name, values)
+    if kind is np.float32:
+        values = values.astype(np.float64)
+    return values if length == 1 else values.reshape(-1, length)
+
+
+def write_attribute(attribute, values):
+    """Set the values of an attribute, (n,) or (n, k)."""
+    name, _, kind = _ATTRIBUTES[attribute.data_type]
+    attribute.data.foreach_set(name, np.ascontiguousarray(values, dtype=kind).reshape(-1))
 
 
 def new_world(name):

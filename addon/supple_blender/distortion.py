@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A colour attribute that shows how much a pose stretches the surface, and its legend."""
 
-import bpy
 import numpy as np
 
-from . import compat, groups, handles, mesh_data, native, space
+from . import colour_view, compat, groups, handles, mesh_data, native, space
 
 ATTRIBUTE = "Supple Distortion"
 
@@ -23,7 +22,7 @@ COLOURS = np.array(
 
 def is_shown(obj):
     """Return whether mesh object obj has the attribute."""
-    return ATTRIBUTE in obj.data.color_attributes
+    return colour_view.has(obj, ATTRIBUTE)
 
 
 def colours(values):
@@ -46,8 +45,7 @@ def at_vertices(rest, positions):
 
 def update(obj, rest, positions):
     """Colour obj by the distortion of `positions` (n, 3), local, against RestMesh rest."""
-    data = obj.data.color_attributes[ATTRIBUTE].data
-    data.foreach_set("color", colours(at_vertices(rest, positions)).ravel())
+    colour_view.write(obj, ATTRIBUTE, colours(at_vertices(rest, positions)))
 
 
 def _seen(obj):
@@ -75,55 +73,21 @@ def show(context, obj):
     rest = mesh_data.collect(obj, handles.world_matrix(context, obj))
     distortions = at_vertices(rest, _seen(obj))
     mesh_data.leave_mode(obj)
-    attributes = obj.data.color_attributes
-    active = attributes.active_color.name if attributes.active_color else ""
-    attributes.new(ATTRIBUTE, "FLOAT_COLOR", "POINT")
-    if active:
-        attributes.active_color = attributes[active]
-    attributes[ATTRIBUTE].data.foreach_set("color", colours(distortions).ravel())
-    obj.data.update()
+    colour_view.add(obj, ATTRIBUTE, colours(distortions))
 
 
 def hide(obj):
     """Remove the attribute from obj, and show the viewport as it was before `view`."""
     mesh_data.require_writable(obj)
     mesh_data.leave_mode(obj)
-    attributes, body = obj.data.color_attributes, obj.supple
-    active = attributes.active_color.name if attributes.active_color else ""
-    attributes.remove(attributes[ATTRIBUTE])
-    name = body.colour_before if active == ATTRIBUTE else active
-    if name in attributes:
-        attributes.active_color = attributes[name]
-    if body.shading_before:
-        for space_data in _views():
-            if space_data.shading.color_type == "VERTEX":
-                space_data.shading.color_type = body.shading_before
-    body.shading_before = body.colour_before = ""
+    colour_view.remove(obj, ATTRIBUTE)
 
 
 def view(obj, space_data):
     """Make a 3D View show the attribute of obj; `hide` takes that back."""
-    attributes, body = obj.data.color_attributes, obj.supple
-    active = attributes.active_color
-    if active and active.name != ATTRIBUTE:
-        body.colour_before = active.name
-    attributes.active_color = attributes[ATTRIBUTE]
-    shading = space_data.shading
-    if shading.color_type != "VERTEX":
-        body.shading_before = shading.color_type
-    shading.type, shading.color_type = "SOLID", "VERTEX"
+    colour_view.view(obj, ATTRIBUTE, space_data)
 
 
 def is_viewed(obj, space_data):
     """Return whether a 3D View shows the attribute of obj."""
-    active = obj.data.color_attributes.active_color
-    shading = space_data.shading
-    shows = shading.type == "SOLID" and shading.color_type == "VERTEX"
-    return shows and active is not None and active.name == ATTRIBUTE
-
-
-def _views():
-    for screen in bpy.data.screens:
-        for area in screen.areas:
-            if area.type == "VIEW_3D":
-                yield area.spaces.active
+    return colour_view.is_viewed(obj, ATTRIBUTE, space_data)

@@ -47,6 +47,24 @@ def weights(obj, name):
     return found
 
 
+def read(obj, mesh):
+    """Return the weights (n, g) float64 of the g vertex groups of obj; mesh: its readable mesh."""
+    found = np.zeros((len(mesh.vertices), len(obj.vertex_groups)))
+    for vertex in mesh.vertices:
+        for element in vertex.groups:
+            if element.group < found.shape[1]:
+                found[vertex.index, element.group] = element.weight
+    return found
+
+
+def write(obj, name, values):
+    """Make vertex group `name` of obj, in Object Mode, hold exactly the weights (n,) above 0."""
+    group = obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name)
+    group.remove(range(len(values)))
+    for vertex in np.flatnonzero(values):
+        group.add([int(vertex)], float(values[vertex]), "REPLACE")
+
+
 def add(obj, name, vertices):
     """Add a vertex group of these vertices, with weight 1; return its name, which may differ."""
     group = obj.vertex_groups.new(name=name)

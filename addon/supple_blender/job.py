@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pose without a window, from a job file.
+"""Pose or match without a window, from a job file.
 
     blender -b [FILE.blend] --python-exit-code 1 -P job.py -- JOB.toml [--out DIR]
     blender --command supple JOB.toml [--out DIR]                    (Blender 4.2 and later)
 
 The installed add-on does the work, enabled for this process if it is not; without one, the add-on
 that this file is part of. The exit code is 0 when everything asked for was written, else 1; then
-stderr says why and nothing was saved. docs/blender.md describes the job file.
+stderr says why and nothing was saved; of several targets of a match, only those that failed are
+left out. docs/blender.md describes the job file.
 """
 
 import argparse
@@ -17,17 +18,22 @@ from pathlib import Path
 
 def main(arguments):
     """Run the job that `arguments` (a list of strings) name; return the exit code."""
-    from . import job_file, job_run
+    from . import job_file, job_run, job_table, match_job, match_job_run
     from .errors import UserError
 
-    parser = argparse.ArgumentParser(prog="supple", description="Pose a mesh from a job file.")
+    parser = argparse.ArgumentParser(
+        prog="supple", description="Pose a mesh, or match meshes, from a job file."
+    )
     parser.add_argument("job", type=Path, help="the job file (TOML)")
     parser.add_argument(
         "--out", type=Path, help="folder for relative output paths (default: the job file's)"
     )
     options = parser.parse_args(arguments)
     try:
-        job_run.run(job_file.read(options.job, options.out))
+        if job_table.load(options.job).has("match"):
+            match_job_run.run(match_job.read(options.job, options.out))
+        else:
+            job_run.run(job_file.read(options.job, options.out))
     except UserError as error:
         print(f"Supple: {error}", file=sys.stderr, flush=True)
         return 1

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reading and checking a job file (TOML). Every message names the file and the key."""
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from . import job_table
 from .errors import UserError
 
 ENGINES = {"cycles": "CYCLES", "workbench": "BLENDER_WORKBENCH"}
@@ -63,75 +63,6 @@ class Job:
     blend: Path | None
     report: Path | None
     render: Render | None
-
-
-class _Table:
-    """A TOML table whose keys are taken one by one; what is left over at the end is an error."""
-
-    def __init__(self, data, file, where):
-        self._data, self._file, self._where = dict(data), file, where
-        self._known = []
-
-    def error(self, key, message):
-        return UserError(f"{self._file}: {self._where}{key}: {message}")
-
-    def take(self, key, kind, default=None, *, required=False):
-        """Return the value of `key`, checked to be a `kind`, which is a key of _NAMES."""
-        self._known.append(key)
-        if key not in self._data:
-            if required:
-                raise self.error(key, "missing; it must be given")
-            return default
-        value = self._data.pop(key)
-        if kind is float and type(value) is int:
-            value = float(value)
-        if type(value) is not kind:
-            raise self.error(key, f"must be a {_NAMES[kind]}, not {value!r}")
-        return value
-
-    def table(self, key, *, required=False):
-        """Return the table `key` as a _Table, or None."""
-        data = self.take(key, dict, required=required)
-        return None if data is None else _Table(data, self._file, f"{self._where}{key}.")
-
-    def choice(self, key, options, default):
-        value = self.take(key, str, default)
-        if value not in options:
-            raise self.error(key, f"must be one of {', '.join(options)}, not '{value}'")
-        return value
-
-    def path(self, key, folder, *, required=False):
-        """Return a path, taken from `folder` if it is relative, or None."""
-        value = self.take(key, str, required=required)
-        return None if value is None else folder / value
-
-    def numbers(self, key, shape):
-        """Return an array of finite numbers of this shape, or None."""
-        value = self.take(key, list)
-        if value is None:
-            return None
-        text = " x ".join(map(str, shape))
-        try:
-            array = np.array(value, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise self.error(key, f"must be {text} numbers") from None
-        if array.shape != shape or not np.isfinite(array).all():
-            raise self.error(key, f"must be {text} finite numbers")
-        return array
-
-    def end(self):
-        for key in self._data:
-            raise self.error(key, f"unknown; the keys here are {', '.join(self._known)}")
-
-
-_NAMES = {
-    str: "text",
-    bool: "true or false",
-    int: "whole number",
-    float: "number",
-    list: "list",
-    dict: "table",
-}
 
 
 def _source(table, folder):
@@ -203,7 +134,7 @@ def _moves(top, file):
         where = f"handles[{index}]"
         if not isinstance(data, dict):
             raise UserError(f"{file}: {where}: must be a table ([[handles]])")
-        moves.append(_move(_Table(data, file, f"{where}.")))
+        moves.append(_move(job_table.Table(data, file, f"{where}.")))
     names = [move.group for move in moves]
     for index, name in enumerate(names):
         if name in names[:index]:
@@ -238,17 +169,10 @@ def read(path, out=None):
 
     Input paths are relative to the file's folder, output paths to `out` (None: the same folder).
     """
-    path = Path(path).absolute()
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UserError(f"{path}: can't be read: {error.strerror}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise UserError(f"{path}: not a TOML file: {error}") from error
-    folder = path.parent
+    top = job_table.load(path)
+    path, folder = top.file, top.file.parent
     out = folder if out is None else Path(out).absolute()
-    top = _Table(data, path, "")
-    options = top.table("options") or _Table({}, path, "options.")
+    options = top.table("options") or job_table.Table({}, path, "options.")
     output = top.table("output", required=True)
     job = Job(
         path=path,

@@ -2,9 +2,7 @@
 """Running a job: open, pose, bake, save. Nothing is left behind by a job that fails."""
 
 import json
-import os
 import time
-from contextlib import contextmanager
 
 import bpy
 import numpy as np
@@ -13,6 +11,7 @@ from . import (
     VERSION,
     groups,
     handles,
+    job_output,
     job_render,
     mesh_data,
     motions,
@@ -27,10 +26,6 @@ from .stages import Stages
 # The other axis of an OBJ: bodies with Y up look along Z, as Blender's own default has it.
 FORWARD = {"Y": "NEGATIVE_Z", "Z": "Y"}
 STIFFNESS = {"natural": 0.0, "stiff": 1.0}
-
-
-def _say(text):
-    print(f"Supple: {text}", flush=True)
 
 
 def _import(source, file):
@@ -68,10 +63,7 @@ def _require_file_order(obj, path, file):
 
 def _find(source, file):
     if source.blend:
-        try:
-            bpy.ops.wm.open_mainfile(filepath=str(source.blend), load_ui=False)
-        except RuntimeError as error:
-            raise UserError(f"{file}: input.blend: {error}") from error
+        job_output.open_blend(source.blend, file)
     if not source.object:
         return bpy.context.view_layer.objects.active
     obj = bpy.context.scene.objects.get(source.object)
@@ -131,32 +123,6 @@ def _pose(job, obj):
     return pose_input, pose.solve(pose_input, Stages())
 
 
-@contextmanager
-def _all_or_nothing(targets):
-    """Yield {target: path to write to}; on success they take the targets' places, else they go."""
-    partial = {path: path.with_name(f".partial-{os.getpid()}-{path.name}") for path in targets}
-    try:
-        for path in targets:
-            if path.is_dir():
-                raise UserError(f"{path}: is a folder, so no file of this name can be written")
-            path.parent.mkdir(parents=True, exist_ok=True)
-        yield partial
-        for path, written in partial.items():
-            os.replace(written, path)
-    except OSError as error:
-        raise UserError(f"{error.filename}: can't be written: {error.strerror}") from error
-    finally:
-        for written in partial.values():
-            written.unlink(missing_ok=True)
-
-
-def _save(path):
-    try:
-        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, check_existing=False)
-    except RuntimeError as error:
-        raise UserError(f"{path}: can't be saved: {error}") from error
-
-
 def _report(job, pose_input, result, seconds):
     rest = pose_input.rest
     return {
@@ -177,11 +143,6 @@ def _report(job, pose_input, result, seconds):
     }
 
 
-def _plain(value):
-    """Return a NumPy scalar or array as what JSON knows."""
-    return value.tolist()
-
-
 def run(job):
     """Run a job_file.Job. Raises UserError; then nothing was written."""
     native.supple()
@@ -192,22 +153,21 @@ def run(job):
     if job.source.groups:
         _add_groups(obj, job.source.groups, file)
     shape_keys.require_free(obj, job.key, job.overwrite)
-    _say(f"{obj.name}: {len(obj.data.vertices):,} vertices, {len(job.moves)} handles")
+    job_output.say(f"{obj.name}: {len(obj.data.vertices):,} vertices, {len(job.moves)} handles")
     pose_input, result = _pose(job, obj)
     seconds = time.perf_counter() - start
     shape_keys.write(obj, job.key, result.positions)
     for note in result.notes:
-        _say(f"{obj.name}: {note}")
+        job_output.say(f"{obj.name}: {note}")
     render = job.render
     pictures = [path for path in (render.before, render.after) if path] if render else []
     targets = [job.blend, *([job.report] if job.report else []), *pictures]
-    with _all_or_nothing(targets) as partial:
-        _save(partial[job.blend])
+    with job_output.all_or_nothing(targets) as partial:
+        job_output.save(partial[job.blend])
         if pictures:
             job_render.before_and_after(obj, job.key, render, partial)
         if job.report:
             report = _report(job, pose_input, result, seconds)
-            text = json.dumps(report, indent=2, default=_plain)
-            partial[job.report].write_text(text + "\n", encoding="utf-8")
+            job_output.write_json(partial[job.report], report)
     for path in targets:
-        _say(f"wrote {path}")
+        job_output.say(f"wrote {path}")

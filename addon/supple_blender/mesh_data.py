@@ -2,6 +2,7 @@
 """A mesh object's rest shape as arrays, read without changing it."""
 
 import hashlib
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
@@ -58,6 +59,20 @@ def flush_edit_mode(obj):
         obj.update_from_editmode()
 
 
+@contextmanager
+def readable(obj):
+    """Yield the mesh of obj with all its layers; in Edit Mode, where they can't be read, a copy."""
+    if not obj.data.is_editmode:
+        yield obj.data
+        return
+    flush_edit_mode(obj)
+    copy = obj.data.copy()
+    try:
+        yield copy
+    finally:
+        bpy.data.meshes.remove(copy)
+
+
 def leave_mode(obj):
     """Put obj into Object Mode, before it is changed.
 
@@ -66,6 +81,16 @@ def leave_mode(obj):
     """
     if obj.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def leave_modes(context, *objects):
+    """As leave_mode, whichever object is active and edited; objects are those to be changed."""
+    active = context.view_layer.objects.active
+    if active is not None:
+        leave_mode(active)
+    for obj in objects:
+        if obj.mode != "OBJECT":
+            raise UserError(f"{obj.name}: it is edited elsewhere. Put it into Object Mode first.")
 
 
 def rest_positions(obj):
@@ -91,9 +116,10 @@ def _count_ngons(mesh):
     return int((corners > 4).sum())
 
 
-def _digest(positions, triangles, stretch):
+def digest_of(*arrays):
+    """Return a fingerprint of arrays, as text."""
     digest = hashlib.blake2b(digest_size=16)
-    for array in (positions, triangles, stretch):
+    for array in arrays:
         digest.update(np.int64(len(array)).tobytes())
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()
@@ -128,5 +154,5 @@ def collect(obj, world):
         triangles=triangles,
         ngons=_count_ngons(obj.data),
         stretch=stretch,
-        digest=_digest(positions, triangles, stretch),
+        digest=digest_of(positions, triangles, stretch),
     )

@@ -30,7 +30,7 @@ from .pose_operators import (
 )
 
 
-def _draw_text(layout, text, icon):
+def draw_text(layout, text, icon):
     """Draw a long message, wrapped to the sidebar's usual width."""
     column = layout.column(align=True)
     for index, line in enumerate(textwrap.wrap(text, 42)):
@@ -55,19 +55,19 @@ class SUPPLE_UL_handles(bpy.types.UIList):
         ).name = item.name
 
 
-class _Sidebar:
+class Sidebar:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Supple"
 
 
-class SUPPLE_PT_mesh(_Sidebar, bpy.types.Panel):
+class SUPPLE_PT_mesh(Sidebar, bpy.types.Panel):
     bl_label = "Mesh"
 
     def draw(self, context):
         layout = self.layout
         if native.problem():
-            _draw_text(layout, native.problem(), "ERROR")
+            draw_text(layout, native.problem(), "ERROR")
             return
         obj = handles.body_of(context.object)
         if obj is None or obj.type != "MESH":
@@ -86,10 +86,10 @@ class SUPPLE_PT_mesh(_Sidebar, bpy.types.Panel):
         row.operator(SUPPLE_OT_prepare.bl_idname, text=text)
         row.operator(SUPPLE_OT_check_mesh.bl_idname)
         for note in ready.notes if ready else ():
-            _draw_text(layout, note, "INFO")
+            draw_text(layout, note, "INFO")
 
 
-class SUPPLE_PT_pose(_Sidebar, bpy.types.Panel):
+class SUPPLE_PT_pose(Sidebar, bpy.types.Panel):
     bl_label = "Pose"
 
     @classmethod
@@ -110,7 +110,7 @@ class SUPPLE_PT_pose(_Sidebar, bpy.types.Panel):
         column.operator(SUPPLE_OT_handles_clear.bl_idname, text="", icon="X")
         self._draw_sources(layout)
         if body.handles and body.bound_vertices != len(obj.data.vertices):
-            _draw_text(layout, f"It had {body.bound_vertices:,} vertices before", "ERROR")
+            draw_text(layout, f"It had {body.bound_vertices:,} vertices before", "ERROR")
             layout.operator(SUPPLE_OT_rebind.bl_idname)
         self._draw_look(layout, body)
         self._draw_live(layout, obj)
@@ -148,9 +148,9 @@ class SUPPLE_PT_pose(_Sidebar, bpy.types.Panel):
             layout.label(text=live.running.doing, icon="INFO")
             layout.label(text="Enter keeps, Esc takes back")
             if live.running.problem:
-                _draw_text(layout, live.running.problem, "ERROR")
+                draw_text(layout, live.running.problem, "ERROR")
         elif live.ended:
-            _draw_text(layout, live.ended, "INFO")
+            draw_text(layout, live.ended, "INFO")
 
     def _draw_key(self, layout, obj):
         name = obj.supple.key_name
@@ -164,7 +164,7 @@ class SUPPLE_PT_pose(_Sidebar, bpy.types.Panel):
             layout.prop(obj.supple, "overwrite", text=f"Overwrite '{name}'")
 
 
-class _PoseSettings(_Sidebar):
+class _PoseSettings(Sidebar):
     bl_parent_id = "SUPPLE_PT_pose"
     bl_options = {"DEFAULT_CLOSED"}
 

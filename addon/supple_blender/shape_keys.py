@@ -57,7 +57,12 @@ def require_free(obj, name, overwrite=False):
         )
 
 
-def _write(obj, name, positions):
+def put(obj, name, positions):
+    """Write local positions (n, 3) to shape key `name` and make it the active key.
+
+    Adds the Basis if there is none and the key if there is none, with value 1; a key that exists
+    keeps its value. Every other key is left as it is. Call `require_free` before.
+    """
     if not obj.data.shape_keys:
         compat.add_key(obj, "Basis")
         obj.supple.made_basis = True
@@ -87,18 +92,13 @@ def _remove_preview(obj):
 
 
 def write(obj, name, positions):
-    """Write local positions (n, 3) to shape key `name` and make it the active key.
-
-    Adds the Basis if there is none and the key if there is none, with value 1; a key that exists
-    keeps its value. Every other key is left as it is, except that the preview goes. Ends Edit Mode.
-    Call `require_free` before.
-    """
+    """As `put`, except that the preview goes. Ends Edit Mode."""
     mesh_data.leave_mode(obj)
     if name == PREVIEW:
-        _write(obj, name, positions)
+        put(obj, name, positions)
         return
     _remove_preview(obj)
-    _write(obj, name, positions)
+    put(obj, name, positions)
     obj.supple.overwrite = False  # meant for one bake
     obj.supple.made_basis = False  # a baked key needs it: it is the user's from now on
 

@@ -52,3 +52,17 @@ class Stages:
         """Return how long this stage will take, such as 'about 12 s left', or ''."""
         seconds = self.seconds_left
         return "" if seconds is None else f"about {seconds:.0f} s left"
+
+
+class Part:
+    """A share of another Stages, for work that is one of several."""
+
+    def __init__(self, stages, share):
+        self._stages, self._share = stages, share
+
+    def begin(self, label, share):
+        return self._stages.begin(label, share * self._share)
+
+    @property
+    def cancelled(self):
+        return self._stages.cancelled

@@ -14,6 +14,7 @@ import bpy  # noqa: E402
 import carrier_parts  # noqa: E402
 import install  # noqa: E402
 import live_parts  # noqa: E402
+import match_parts  # noqa: E402
 import numpy as np  # noqa: E402
 from robot import Robot  # noqa: E402
 
@@ -231,6 +232,7 @@ def scenario(robot):
         *live_parts.PARTS,
         *carrier_parts.PARTS,
         cancel_long_work,
+        *match_parts.PARTS,
     ):
         yield from part(robot)
 

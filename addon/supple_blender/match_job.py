@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reading and checking a job file that matches: one with a table [match]."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from . import job_table, match_collect, transfer_collect
+
+STARTS = ("automatic", "landmarks", "nearest", "aligned", "uvs", "file")
+PARTS = ("uvs", "weights", "colours", "keys", "fit")
+
+
+@dataclass(frozen=True)
+class MatchJob:
+    """A checked job file. input: a .blend, or None for the open file."""
+
+    path: Path
+    input: Path | None
+    source: str
+    targets: list
+    options: match_collect.Options
+    transfer: transfer_collect.Options
+    blend: Path
+    report: Path | None
+
+
+def _names(table, key, *, allowed=None):
+    """Return a list of text that is not empty, in `allowed` if that is given."""
+    names = table.take(key, list, required=True)
+    if not names or not all(type(name) is str for name in names):
+        raise table.error(key, "must be a list of names, at least one")
+    for name in names:
+        if names.count(name) > 1:
+            raise table.error(key, f"'{name}' is there twice")
+        if allowed and name not in allowed:
+            raise table.error(key, f"must be some of {', '.join(allowed)}, not '{name}'")
+    return names
+
+
+def _pairs(table):
+    pairs = table.take("landmarks", list, [])
+    for pair in pairs:
+        if type(pair) is not list or [type(vertex) for vertex in pair] != [int, int]:
+            raise table.error("landmarks", "must be pairs [source vertex, target vertex]")
+    return tuple(map(tuple, pairs))
+
+
+def _options(table, folder, targets):
+    start = table.choice("start", STARTS, "automatic")
+    file, pairs = table.path("file", folder), _pairs(table)
+    for key, value in (("file", file), ("landmarks", pairs)):
+        if bool(value) != (start == key):
+            raise table.error(key, f'must be given with start = "{key}", and only then')
+        if value and len(targets) > 1:
+            raise table.error(key, f"fits one target, not {len(targets)}")
+    return match_collect.Options(
+        start.upper(), table.take("refine", bool, True), pairs, str(file or "")
+    )
+
+
+def _transfer(table):
+    return transfer_collect.Options(
+        frozenset(name.upper() for name in _names(table, "transfer", allowed=PARTS)),
+        table.take("only_active_key", bool, False),
+        table.take("drivers", bool, False),
+        table.take("overwrite", bool, False),
+    )
+
+
+def read(path, out=None):
+    """Return the MatchJob in TOML file `path`. Raises UserError.
+
+    Input paths are relative to the file's folder, output paths to `out` (None: the same folder).
+    """
+    top = job_table.load(path)
+    folder = top.file.parent
+    out = folder if out is None else Path(out).absolute()
+    given = top.table("input") or job_table.Table({}, top.file, "input.")
+    table, output = (top.table(key, required=True) for key in ("match", "output"))
+    targets = _names(table, "targets")
+    job = MatchJob(
+        path=top.file,
+        input=given.path("blend", folder),
+        source=table.take("source", str, required=True),
+        targets=targets,
+        options=_options(table, folder, targets),
+        transfer=_transfer(table),
+        blend=output.path("blend", out, required=True),
+        report=output.path("report", out),
+    )
+    for each in (given, table, output, top):
+        each.end()
+    if job.input and not job.input.is_file():
+        raise given.error("blend", f"there is no file {job.input}")
+    if job.source in targets:
+        raise table.error("targets", f"'{job.source}' is the source")
+    if job.blend.suffix != ".blend":
+        raise output.error("blend", f"must end in .blend, not '{job.blend.name}'")
+    return job
