@@ -23,9 +23,8 @@ class SoftHandlesTest : public ::testing::Test {
     const Eigen::Matrix4d& matrix = *edit.targets[1].matrix;
     double sum = 0.0;
     for (const int v : vertices) {
-      const Eigen::Vector3d goal =
-          matrix.topLeftCorner<3, 3>() * mesh.vertices.row(v).transpose() +
-          matrix.topRightCorner<3, 1>();
+      const Eigen::Vector3d goal = matrix.topLeftCorner<3, 3>() * mesh.vertices.row(v).transpose() +
+                                   matrix.topRightCorner<3, 1>();
       sum += (points.row(v).transpose() - goal).norm();
     }
     return sum / static_cast<double>(vertices.size()) / test::diagonal(mesh.vertices);
@@ -64,8 +63,7 @@ TEST_F(SoftHandlesTest, NextToNoWeightIsNoHandle) {
   for (const auto& [name, options] : test::kinds(40)) {
     const Editor without(prepared, {edit.handles[0]}, network);
     const Points expected = without.solve({edit.targets[0]}, options).vertices;
-    EXPECT_LT(test::farthest(posed(1e-7, options), expected),
-              1e-4 * test::diagonal(mesh.vertices))
+    EXPECT_LT(test::farthest(posed(1e-7, options), expected), 1e-4 * test::diagonal(mesh.vertices))
         << name;
   }
 }
@@ -142,9 +140,9 @@ TEST_F(SoftHandlesTest, OtherWeightsOnAFormerEditorAreBoundAnew) {
   const std::vector<Handle> more = {edit.handles[0], edit.handles[1], third};
   const std::vector<HandleTarget> targets = {edit.targets[0], edit.targets[1], {}};
   const Points expected = Editor(prepared, more, network).solve(targets).vertices;
-  EXPECT_LT(test::farthest(Editor(prepared, more, network, {}, &fresh).solve(targets).vertices,
-                           expected),
-            1e-6 * test::diagonal(mesh.vertices));
+  EXPECT_LT(
+      test::farthest(Editor(prepared, more, network, {}, &fresh).solve(targets).vertices, expected),
+      1e-6 * test::diagonal(mesh.vertices));
 }
 
 }  // namespace

@@ -29,8 +29,8 @@ TEST(NearestMotion, OfARigidMotionIsThatMotion) {
   for (uint64_t which = 0; which < 8; ++which) {
     const Matrix3 turn = test::rotation(which);
     const Eigen::RowVector3d offset(1.0, -2.0, 0.5);
-    expect_motion(nearest_motion(rest, (rest * turn).rowwise() + offset, ones(9), {turn}), turn, offset,
-                  1e-10);
+    expect_motion(nearest_motion(rest, (rest * turn).rowwise() + offset, ones(9), {turn}), turn,
+                  offset, 1e-10);
   }
 }
 
@@ -40,10 +40,11 @@ TEST(NearestMotion, WhatPointsLeaveOpenTheTurnsDecide) {
   line.col(2) << 0.0, 0.1, 0.5, 1.0;
   const Matrix3 turn = about({0, 0, 1}, 1.3);
   const Eigen::RowVector3d offset(0.2, 0.3, 0.4);
-  expect_motion(nearest_motion(line, (line * turn).rowwise() + offset, ones(4), {turn}), turn, offset,
-                1e-10);
+  expect_motion(nearest_motion(line, (line * turn).rowwise() + offset, ones(4), {turn}), turn,
+                offset, 1e-10);
   const Points one = line.bottomRows(1);
-  expect_motion(nearest_motion(one, (one * turn).rowwise() + offset, ones(1), {turn}), turn, offset, 1e-10);
+  expect_motion(nearest_motion(one, (one * turn).rowwise() + offset, ones(1), {turn}), turn, offset,
+                1e-10);
 }
 
 TEST(NearestMotion, WhatNothingDecidesDoesNotTurn) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -96,6 +97,55 @@ TEST(TransferCorners, TurnedCylindersCrossTheSeamInTheirFaces) {
   zoo::Mesh target = zoo::open_cylinder(28, 16);
   target.vertices = (target.vertices * rotation_matrix({0, 0, 0.037})).eval();
   expect_unwrapped(zoo::open_cylinder(40, 12), target, cylinder_uv, 0.01);
+}
+
+// Every triangle at a pole has its own place for it in the layout, half-way between its other two.
+TEST(TransferCorners, TheFansAtAGlobesPolesKeepTheirOwnValues) {
+  constexpr int kAround = 32, kRings = 19;
+  zoo::Mesh globe;
+  globe.vertices.resize(kAround * kRings + 2, 3);
+  for (int r = 0; r < kRings; ++r) {
+    for (int a = 0; a < kAround; ++a) {
+      const double polar = std::numbers::pi * (r + 1) / (kRings + 1);
+      const double angle = 2.0 * std::numbers::pi * a / kAround;
+      globe.vertices.row(r * kAround + a) << std::sin(polar) * std::cos(angle),
+          std::sin(polar) * std::sin(angle), std::cos(polar);
+    }
+  }
+  const int north = kAround * kRings, south = north + 1;
+  globe.vertices.bottomRows(2) << 0, 0, 1, 0, 0, -1;
+  std::vector<Eigen::RowVector3i> faces;
+  std::vector<Uv> uvs;
+  const auto add = [&](std::array<int, 3> vertices, std::array<Uv, 3> at) {
+    faces.emplace_back(vertices[0], vertices[1], vertices[2]);
+    uvs.insert(uvs.end(), at.begin(), at.end());
+  };
+  for (int a = 0; a < kAround; ++a) {
+    const int b = (a + 1) % kAround, last = (kRings - 1) * kAround;
+    const double u = static_cast<double>(a) / kAround, next = u + 1.0 / kAround;
+    const auto v = [](int ring) { return 1.0 - (ring + 1.0) / (kRings + 1.0); };
+    add({north, a, b}, {Uv(u + 0.5 / kAround, 1), Uv(u, v(0)), Uv(next, v(0))});
+    add({south, last + b, last + a},
+        {Uv(u + 0.5 / kAround, 0), Uv(next, v(kRings - 1)), Uv(u, v(kRings - 1))});
+    for (int r = 0; r + 1 < kRings; ++r) {
+      const int top = r * kAround, low = top + kAround;
+      add({top + a, low + a, low + b}, {Uv(u, v(r)), Uv(u, v(r + 1)), Uv(next, v(r + 1))});
+      add({top + a, low + b, top + b}, {Uv(u, v(r)), Uv(next, v(r + 1)), Uv(next, v(r))});
+    }
+  }
+  globe.faces.resize(static_cast<Eigen::Index>(faces.size()), 3);
+  RowMatrix<double> corners(static_cast<Eigen::Index>(uvs.size()), 2);
+  for (size_t f = 0; f < faces.size(); ++f) {
+    globe.faces.row(static_cast<Eigen::Index>(f)) = faces[f];
+  }
+  for (size_t i = 0; i < uvs.size(); ++i) {
+    corners.row(static_cast<Eigen::Index>(i)) = uvs[i];
+  }
+  const RowMatrix<double> got =
+      transfer_corners(closest(globe, globe.vertices), {globe.vertices, globe.faces}, globe.faces,
+                       corners)
+          .values;
+  EXPECT_LT((got - corners).cwiseAbs().maxCoeff(), 1e-6);
 }
 
 TEST(TransferCorners, APolygonsTrianglesAgreeAtTheirCorners) {

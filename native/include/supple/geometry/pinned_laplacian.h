@@ -34,14 +34,16 @@ class PinnedLaplacian {
 };
 
 /// The smoothest functions through given values at some vertices: the least integral of (Delta
-/// x)^2, Delta x = M^-1 W x. Source: Botsch and Kobbelt 2004, its kernel form: a point costs two Laplace
-/// solves once, a function through its value then only a product; no bilaplacian is factored.
+/// x)^2, Delta x = M^-1 W x. Source: Botsch and Kobbelt 2004, its kernel form: a point costs two
+/// Laplace solves once, a function through its value then only a product; no bilaplacian is
+/// factored.
 class BiharmonicInterpolation {
  public:
   /// points: distinct indices in [0, n), at least one a component. former: of the same base; what
   /// the two share is not computed again. compliance: one a point, >= 0; empty for 0: how far the
-  /// function may miss it, adding (x - value)^2 / compliance to what is least. Errors: `index_out_of_range`, `overlapping_handles` (a
-  /// point twice), `no_handles` (a component without a point).
+  /// function may miss it, adding (x - value)^2 / compliance to what is least. Errors:
+  /// `index_out_of_range`, `overlapping_handles` (a point twice), `no_handles` (a component without
+  /// a point).
   BiharmonicInterpolation(std::shared_ptr<const PinnedLaplacian> base, Eigen::VectorXi points,
                           const BiharmonicInterpolation* former = nullptr,
                           Eigen::VectorXd compliance = {});
@@ -59,7 +61,7 @@ class BiharmonicInterpolation {
   Eigen::VectorXi free_;       // places in points_ that are no reference
   // n x 8 each: Green's functions of the bilaplacian, G M (G - its mean), one column a point.
   std::vector<std::shared_ptr<const RowMatrix<double>>> kernels_;
-  RowMatrix<double> gram_;  // points x points: the kernels at the points
+  RowMatrix<double> gram_;      // points x points: the kernels at the points
   Eigen::VectorXd compliance_;  // a point
   Eigen::LLT<Eigen::MatrixXd> complement_;
 };

@@ -96,8 +96,8 @@ struct EditSession::State {
   bool with_network = false, aimed = false;
   int polish = 0, passes = 0;
 
-  Points positions;  // of every handle vertex in handle order, caller's units
-  Points held;       // of editor->held_, surface units
+  Points positions;     // of every handle vertex in handle order, caller's units
+  Points held;          // of editor->held_, surface units
   Points soft_targets;  // those of them that are soft
   RigidMotion whole;
   std::vector<Matrix3> guide_rotations;

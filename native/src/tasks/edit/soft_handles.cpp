@@ -11,8 +11,7 @@ SparseMatrix SoftHandles::added_to(const SparseMatrix& laplacian) const {
   return result;
 }
 
-void SoftHandles::add_residual(const Points& moved, const Points& targets,
-                               Points& residual) const {
+void SoftHandles::add_residual(const Points& moved, const Points& targets, Points& residual) const {
   for (Eigen::Index i = 0; i < vertices.size(); ++i) {
     residual.row(vertices[i]) += pull[i] * (targets.row(i) - moved.row(vertices[i]));
   }

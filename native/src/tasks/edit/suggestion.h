@@ -19,8 +19,8 @@ struct RigidMotion {
 };
 
 /// The rigid motion nearest to rest -> moved (k x 3 each); weights: k. turns: rotations that are
-/// known besides, each times its weight; one of weight 1 counts like three more points at a tenth of
-/// the surface's size, enough to decide where the points alone leave a turn open (one vertex, a
+/// known besides, each times its weight; one of weight 1 counts like three more points at a tenth
+/// of the surface's size, enough to decide where the points alone leave a turn open (one vertex, a
 /// straight line).
 RigidMotion nearest_motion(const Points& rest, const Points& moved, const Eigen::VectorXd& weights,
                            const std::vector<Matrix3>& turns);

@@ -19,6 +19,8 @@ using Vector = Eigen::RowVector3d;
 
 // A target face's centre looks for a source face within 80 degrees of its partners' triangle.
 constexpr double kAgree = 0.17;
+// A point this near to a face is on it; squared, as a part of the target face's radius.
+constexpr double kOnFace = 1e-16;
 
 void check_corners(const RowMatrix<double>& corners, const Faces& faces,
                    const CornerOptions& options) {
@@ -156,6 +158,7 @@ class Region {
 
   void grow(int start, const Vector& centre, double radius_squared) {
     ++round_;
+    on_face_ = kOnFace * radius_squared;
     faces_.assign(1, start);
     reached_at_[start] = round_;
     for (size_t i = 0; i < faces_.size(); ++i) {
@@ -175,10 +178,15 @@ class Region {
 
   // The value at a point of the surface, on this side of every seam.
   Eigen::RowVectorXd value(int face, const Vector& weights, const Vector& point) const {
+    // Where seams meet in a vertex, as at the pole of a globe, several faces of the region have the
+    // point, each with a value of its own: the one that the search began at comes first.
+    Place best = place_in(source_.mesh.vertices, source_.mesh.faces, faces_[0], point);
+    if (best.squared <= on_face_) {
+      return at(faces_[0], best.nearest);
+    }
     if (has(face)) {
       return at(face, weights);
     }
-    Place best = place_in(source_.mesh.vertices, source_.mesh.faces, faces_[0], point);
     int nearest = faces_[0];
     for (const int f : faces_) {
       const Place place = place_in(source_.mesh.vertices, source_.mesh.faces, f, point);
@@ -197,6 +205,7 @@ class Region {
 
   const Source& source_;
   std::vector<int> reached_at_, faces_;
+  double on_face_ = 0.0;
   int round_ = -1;
 };
 
