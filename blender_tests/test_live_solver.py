@@ -69,7 +69,9 @@ def test_refining_ends_when_settled_and_begins_anew_at_every_move(bar, addon):
     live = addon("live")
     bpy.ops.supple.live()
     (editor,) = Editor.made
-    assert editor.asked == [{"stiffness": 0.0, "method": "supple", "network": True}]
+    assert editor.asked == [
+        {"stiffness": 0.0, "method": "supple", "network": True, "keep_volume": True}
+    ]
     while live.step(12.0):
         pass
     assert height(bar) == 0.3
@@ -92,7 +94,9 @@ def test_settings_start_a_session_and_strength_does_not(bar, addon):
     assert len(editor.asked) == 1 and height(bar) == 0.15
     bar.supple.stiffness, bar.supple.method, bar.supple.network = 0.5, "ARAP", False
     live.step(12.0)
-    assert editor.asked[1:] == [{"stiffness": 0.5, "method": "arap", "network": False}]
+    assert editor.asked[1:] == [
+        {"stiffness": 0.5, "method": "arap", "network": False, "keep_volume": True}
+    ]
     assert height(bar) == 0.05
 
 
