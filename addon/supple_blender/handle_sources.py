@@ -21,10 +21,7 @@ def from_selection(context, obj, name, kind):
     """Make a vertex group and a handle of the vertices selected in Edit Mode; return its name."""
     mesh_data.require_writable(obj)
     handles.require_bound(obj)
-    mesh_data.flush_edit_mode(obj)
-    selected = np.empty(len(obj.data.vertices), dtype=bool)
-    obj.data.vertices.foreach_get("select", selected)
-    vertices = np.flatnonzero(selected)
+    vertices = mesh_data.selected_vertices(obj)
     if not len(vertices):
         raise UserError(f"{obj.name}: no vertices are selected. Select some in Edit Mode.")
     free = _free(obj, vertices)

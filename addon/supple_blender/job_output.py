@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 import bpy
 
+from . import VERSION, native
 from .errors import UserError
 
 
@@ -47,6 +48,15 @@ def save(path):
         bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, check_existing=False)
     except RuntimeError as error:
         raise UserError(f"{path}: can't be saved: {error}") from error
+
+
+def versions():
+    """Return what made a report."""
+    return {
+        "supple": native.supple().__version__,
+        "addon": ".".join(map(str, VERSION)),
+        "blender": bpy.app.version_string,
+    }
 
 
 def _plain(value):

@@ -8,7 +8,6 @@ import bpy
 import numpy as np
 
 from . import (
-    VERSION,
     groups,
     handles,
     job_output,
@@ -137,9 +136,7 @@ def _report(job, pose_input, result, seconds):
         "figures": pose.figures(pose_input, result),
         "solve": result.report,
         "seconds": seconds,
-        "supple": native.supple().__version__,
-        "addon": ".".join(map(str, VERSION)),
-        "blender": bpy.app.version_string,
+        **job_output.versions(),
     }
 
 

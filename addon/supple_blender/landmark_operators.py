@@ -4,9 +4,10 @@
 import bpy
 from bpy.props import IntProperty
 
-from . import match_collect, mesh_data
+from . import mesh_data
 from .errors import UserError, count
 from .handle_operators import HandleOperator
+from .match_operators import PairOperator
 from .match_view_operators import selected_vertex
 
 
@@ -35,13 +36,13 @@ def add_pair(settings, source_vertex, target_vertex):
 
 
 class LandmarkOperator(HandleOperator):
-    """Mixin for operators on the chosen source and target."""
+    """Mixin for operators on the rows: `change(context, settings)`."""
 
     def body(self, context):
-        return match_collect.chosen(context)
+        return context.scene.supple_match
 
 
-class SUPPLE_OT_landmark_add(LandmarkOperator, bpy.types.Operator):
+class SUPPLE_OT_landmark_add(PairOperator, bpy.types.Operator):
     """Add the vertex selected on the source and the one selected on the target as a pair"""
 
     bl_idname = "supple.landmark_add"
@@ -89,9 +90,6 @@ class SUPPLE_OT_landmark_remove(LandmarkOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    def body(self, context):
-        return context.scene.supple_match
-
     def change(self, context, settings):
         index = self.number - 1 if self.number else settings.active_pair
         if not 0 <= index < len(settings.pairs):
@@ -107,9 +105,6 @@ class SUPPLE_OT_landmarks_clear(LandmarkOperator, bpy.types.Operator):
 
     bl_idname = "supple.landmarks_clear"
     bl_label = "Clear Pairs"
-
-    def body(self, context):
-        return context.scene.supple_match
 
     def change(self, context, settings):
         mesh_data.leave_modes(context)

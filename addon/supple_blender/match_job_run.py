@@ -5,7 +5,7 @@ import time
 
 import bpy
 
-from . import VERSION, job_output, match_batch, native, transfer_write
+from . import job_output, match_batch, native, transfer_write
 from .errors import UserError, count
 from .stages import Stages
 
@@ -38,9 +38,7 @@ def _report(job, done, failed, seconds):
         "targets": targets,
         "failed": failed,
         "seconds": seconds,
-        "supple": native.supple().__version__,
-        "addon": ".".join(map(str, VERSION)),
-        "blender": bpy.app.version_string,
+        **job_output.versions(),
     }
 
 

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Operators that make a map, refine it, turn it round, save it and load it."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -63,6 +62,13 @@ class SUPPLE_OT_refine_match(MatchOperator, bpy.types.Operator):
         return match_collect.Options(start="CURRENT")
 
 
+class PairOperator(HandleOperator):
+    """Mixin for operators on the chosen source and target: `change(context, pair)`."""
+
+    def body(self, context):
+        return match_collect.chosen(context)
+
+
 class _MapFile:
     """Mixin: a file chooser for maps."""
 
@@ -94,7 +100,7 @@ class SUPPLE_OT_match_load(_MapFile, MatchOperator, bpy.types.Operator):
         return super().invoke(context, event) if self.filepath else self.ask(context)
 
 
-class SUPPLE_OT_match_save(_MapFile, HandleOperator, bpy.types.Operator):
+class SUPPLE_OT_match_save(_MapFile, PairOperator, bpy.types.Operator):
     """Save the match to a file, which also knows the two meshes"""
 
     bl_idname = "supple.match_save"
@@ -102,9 +108,6 @@ class SUPPLE_OT_match_save(_MapFile, HandleOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
-
-    def body(self, context):
-        return match_collect.chosen(context)
 
     def change(self, context, pair):
         source, target = pair
@@ -124,14 +127,11 @@ class SUPPLE_OT_match_save(_MapFile, HandleOperator, bpy.types.Operator):
         return self.ask(context)
 
 
-class SUPPLE_OT_match_swap(HandleOperator, bpy.types.Operator):
+class SUPPLE_OT_match_swap(PairOperator, bpy.types.Operator):
     """Exchange source and target; their match and landmarks are turned round"""
 
     bl_idname = "supple.match_swap"
     bl_label = "Swap"
-
-    def body(self, context):
-        return match_collect.chosen(context)
 
     def change(self, context, pair):
         source, target = pair
@@ -158,8 +158,7 @@ class SUPPLE_OT_match_swap(HandleOperator, bpy.types.Operator):
         match_map.require_writable(source)
         kept = match_map.read(target)
         found = match_solving.reversed_match(*rests, kept)
-        forward = match.MatchInput(*rests, "CURRENT", refine=False)
-        return replace(forward, source=rests[1], target=rests[0]), found
+        return match.MatchInput(*reversed(rests), "CURRENT", refine=False), found
 
 
 register, unregister = bpy.utils.register_classes_factory(

@@ -2,20 +2,16 @@
 """Operators that show a match: as colours, and one vertex's partner."""
 
 import bpy
-import numpy as np
 from bpy.props import BoolProperty, IntProperty
 
-from . import handles, match_collect, match_map, match_show, match_solving, mesh_data, space
+from . import handles, match_map, match_show, match_solving, mesh_data, space
 from .errors import UserError
-from .handle_operators import HandleOperator
+from .match_operators import PairOperator
 
 
 def selected_vertex(obj):
     """Return the one vertex of mesh object obj that is selected, or raise UserError."""
-    mesh_data.flush_edit_mode(obj)
-    selected = np.empty(len(obj.data.vertices), dtype=bool)
-    obj.data.vertices.foreach_get("select", selected)
-    found = np.flatnonzero(selected)
+    found = mesh_data.selected_vertices(obj)
     if len(found) != 1:
         raise UserError(
             f"{obj.name}: {len(found):,} vertices are selected. Select exactly one in Edit Mode."
@@ -23,16 +19,13 @@ def selected_vertex(obj):
     return int(found[0])
 
 
-class SUPPLE_OT_match_show(HandleOperator, bpy.types.Operator):
+class SUPPLE_OT_match_show(PairOperator, bpy.types.Operator):
     """Colour the source by place and the target by where its vertices belong; grey is uncertain"""
 
     bl_idname = "supple.match_show"
     bl_label = "Show"
 
     show: BoolProperty(name="Show", default=True, options={"SKIP_SAVE"})
-
-    def body(self, context):
-        return match_collect.chosen(context)
 
     def change(self, context, pair):
         target = pair[1]
@@ -48,7 +41,7 @@ class SUPPLE_OT_match_show(HandleOperator, bpy.types.Operator):
         return "INFO", f"{target.name}: match in colour attribute '{match_show.ATTRIBUTE}'"
 
 
-class SUPPLE_OT_match_partner(HandleOperator, bpy.types.Operator):
+class SUPPLE_OT_match_partner(PairOperator, bpy.types.Operator):
     """Put the 3D Cursor where the selected vertex of the target belongs on the source"""
 
     bl_idname = "supple.match_partner"
@@ -61,9 +54,6 @@ class SUPPLE_OT_match_partner(HandleOperator, bpy.types.Operator):
         min=-1,
         options={"SKIP_SAVE"},
     )
-
-    def body(self, context):
-        return match_collect.chosen(context)
 
     def change(self, context, pair):
         source, target = pair

@@ -103,6 +103,14 @@ def rest_positions(obj):
     return positions.reshape(-1, 3)
 
 
+def selected_vertices(obj):
+    """Return the vertices selected in Edit Mode, (k,)."""
+    flush_edit_mode(obj)
+    selected = np.empty(len(obj.data.vertices), dtype=bool)
+    obj.data.vertices.foreach_get("select", selected)
+    return np.flatnonzero(selected)
+
+
 def _triangles(mesh):
     mesh.calc_loop_triangles()
     triangles = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)

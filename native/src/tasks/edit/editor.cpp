@@ -119,8 +119,9 @@ Eigen::VectorXd compliances(const std::vector<Handle>& handles, const Eigen::Vec
   Eigen::VectorXd result = Eigen::VectorXd::Zero(guides.size());
   for (Eigen::Index g = 0; g < guides.size(); ++g) {
     const int h = groups[guides[g]];
-    if (h >= 0) {
-      result[g] = compliance_of(handles[static_cast<size_t>(h)].weight, shared_by(h));
+    const double weight = h < 0 ? 1.0 : handles[static_cast<size_t>(h)].weight;
+    if (weight < 1.0) {  // else it is 0, and counting the guides for nothing
+      result[g] = compliance_of(weight, shared_by(h));
     }
   }
   return result;
