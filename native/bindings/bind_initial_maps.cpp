@@ -44,12 +44,12 @@ void bind_initial_maps(py::module_& module) {
   module.def(
       "zoomout_map",
       [](const PreparedMesh& source, const PreparedMesh& target, const Eigen::VectorXi& map,
-         int from, int to, int step, Progress* progress) {
-        return zoomout_map(source, target, map, {.from = from, .to = to, .step = step},
+         int from, int to, int step, bool sampled, Progress* progress) {
+        return zoomout_map(source, target, map, {.from = from, .to = to, .step = step}, sampled,
                            range(progress));
       },
       py::arg("source"), py::arg("target"), py::arg("point_map"), py::arg("start"), py::arg("end"),
-      py::arg("step"), py::arg("progress") = nullptr, NoGil());
+      py::arg("step"), py::arg("sampled"), py::arg("progress") = nullptr, NoGil());
 }
 
 }  // namespace supple::bindings

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings.h"
+#include "supple/core/nearest_rows.h"
 #include "supple/geometry/mesh.h"
 #include "supple/geometry/operators.h"
 #include "supple/spectral/eigenbasis.h"

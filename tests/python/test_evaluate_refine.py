@@ -57,6 +57,7 @@ def test_the_report_has_the_rows_and_columns(folder, tmp_path):
         "no_network",
         "ljn",
         "zoomout",
+        "zoomout_samples",
     ]
     for name, row in report["rows"].items():
         for column in (*evaluation.COLUMNS, evaluation.SECONDS):

@@ -745,6 +745,7 @@ def zoomout_map(
     start: typing.SupportsInt | typing.SupportsIndex,
     end: typing.SupportsInt | typing.SupportsIndex,
     step: typing.SupportsInt | typing.SupportsIndex,
+    sampled: bool,
     progress: Progress = None,
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
 def zoomout(

@@ -45,13 +45,13 @@ def _refiner(**options: object) -> Callable[[PreparedMesh, PreparedMesh], Callab
     return bind
 
 
-def _zoomout(source: PreparedMesh, target: PreparedMesh) -> Callable[[Map], Map]:
-    most = min(mesh.native.eigenvalues.size for mesh in (source, target))
-    end = min(ZOOMOUT_TO, most)
-    start = min(ZOOMOUT_FROM, end)
-    return lambda initial: zoomout_map(
-        source, target, initial, start=start, end=end, step=ZOOMOUT_STEP
-    )
+def _zoomout(sampled: bool) -> Callable[[PreparedMesh, PreparedMesh], Callable[[Map], Map]]:
+    def bind(source: PreparedMesh, target: PreparedMesh) -> Callable[[Map], Map]:
+        end = min(ZOOMOUT_TO, *(mesh.native.eigenvalues.size for mesh in (source, target)))
+        rounds = {"start": min(ZOOMOUT_FROM, end), "end": end, "step": ZOOMOUT_STEP}
+        return lambda initial: zoomout_map(source, target, initial, sampled=sampled, **rounds)
+
+    return bind
 
 
 def methods(model: str | Model = "spectral", **options: object) -> list[Method]:
@@ -61,7 +61,8 @@ def methods(model: str | Model = "spectral", **options: object) -> list[Method]:
         Method("spectral_projection", _refiner(method="spectral_projection")),
         Method("no_network", _refiner(model=None, **options)),
         Method("ljn", _refiner(model=model, **options)),
-        Method("zoomout", _zoomout),
+        Method("zoomout", _zoomout(sampled=False)),
+        Method("zoomout_samples", _zoomout(sampled=True)),
     ]
 
 

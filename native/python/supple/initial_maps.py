@@ -156,9 +156,14 @@ def zoomout_map(
     start: int = 20,
     end: int = 120,
     step: int = 5,
+    sampled: bool = False,
     progress: _native.Progress | None = None,
 ) -> NDArray[np.int32]:
     """spectral.zoomout between prepared meshes: (n,) target vertices.
+
+    Args:
+        sampled: for large meshes: between the rounds only the source's prepared samples (1,024 by
+            default) are mapped, all vertices at the end. Less exact: every vertex says more.
 
     Raises:
         SuppleError: wrong_shape, index_out_of_range, bad_option. Cancelled: if progress was
@@ -171,6 +176,7 @@ def zoomout_map(
         start,
         end,
         step,
+        sampled,
         progress,
     )
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "supple/core/dense.h"
+#include "supple/core/nearest_rows.h"
 #include "supple/core/tall.h"
 #include "supple/spectral/functional_map.h"
 

@@ -3,12 +3,14 @@
 
 #include <omp.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <limits>
 #include <numeric>
 #include <random>
 
 #include "native/support.h"
+#include "supple/core/nearest_rows.h"
 #include "supple/geometry/operators.h"
 
 namespace supple {
@@ -215,6 +217,34 @@ TEST_F(ZoomoutTest, IsItsRoundsOneByOne) {
   const Zoomout refined = zoomout(source, target, start, {.from = 20, .to = 40, .step = 7});
   EXPECT_EQ(refined.point_map, map);
   EXPECT_EQ(refined.functional_map, c);
+}
+
+TEST_F(ZoomoutTest, OfSamplesIsItsRoundsByLeastSquaresOverThem) {
+  const Eigen::VectorXi start = damaged(0.3), samples = shuffled(place.size(), 4).head(200);
+  RowMatrix<double> c = functional_map(source, target, start, 20, 20);
+  for (const int count : {27, 34, 40}) {
+    const Eigen::VectorXi map = point_map(source, target, c);
+    const Eigen::MatrixXd own = source.functions(samples, Eigen::seqN(0, count));
+    const Eigen::MatrixXd other =
+        target.functions(Eigen::VectorXi(map(samples)), Eigen::seqN(0, count));
+    const double scale = std::sqrt(target.mass.sum() / source.mass.sum());
+    c = scale * own.colPivHouseholderQr().solve(other);
+  }
+  const Zoomout refined =
+      zoomout(source, target, start, {.from = 20, .to = 40, .step = 7, .samples = samples});
+  EXPECT_LT((refined.functional_map - c).cwiseAbs().maxCoeff(), 1e-6);
+  EXPECT_EQ(refined.point_map, point_map(source, target, refined.functional_map));
+  EXPECT_EQ(matches(refined.point_map, place), place.size());
+}
+
+TEST_F(ZoomoutTest, RefusesTooFewSamplesAndWrongOnes) {
+  Eigen::VectorXi samples = shuffled(place.size(), 4).head(40);
+  const auto refine = [&] {
+    zoomout(source, target, place, {.from = 20, .to = 40, .step = 7, .samples = samples});
+  };
+  EXPECT_TRUE(test::fails_with(ErrorCode::bad_option, {"40 samples", "40 functions"}, refine));
+  samples = Eigen::VectorXi::Constant(41, static_cast<int>(place.size()));
+  EXPECT_TRUE(test::fails_with(ErrorCode::index_out_of_range, {"Sample"}, refine));
 }
 
 TEST_F(ZoomoutTest, ReportsAndCanBeCancelled) {

@@ -21,14 +21,6 @@ RowMatrix<double> functional_map(const Eigenbasis& source, const Eigenbasis& tar
                                  const Eigen::VectorXi& point_map, Eigen::Index source_count,
                                  Eigen::Index target_count);
 
-/// For each row of `queries` (q x k), the nearest row of `points` (p x k, p >= 1) by Euclidean
-/// distance, ties to the lowest index: exactly what comparing every sum of squared differences in
-/// double precision finds. Products in single precision, a block at a time, leave the few rows that
-/// this is done for; the memory is that of a block a thread. Errors: `wrong_shape`, `not_finite`;
-/// `cancelled`.
-Eigen::VectorXi nearest_rows(const RowMatrix<double>& queries, const RowMatrix<double>& points,
-                             ProgressRange progress = {});
-
 /// The target vertex of each source vertex: for row i of Phi_s, the nearest row of Phi_t C^T.
 /// map: C, k_s x k_t, of the first k_s and k_t functions.
 /// Source: the paper, the Eqn after C_21, in the form of Melzi et al. 2019, Eqn 3.
@@ -40,6 +32,9 @@ struct ZoomoutOptions {
   int from = 20;  ///< functions in the first round, >= 1
   int to = 120;   ///< and in the last, >= from
   int step = 5;   ///< more in each round, >= 1; the last round may get fewer
+  /// Source vertices, spread evenly over the surface: only they are mapped between the rounds, and
+  /// every vertex at the end. More of them than `to`; empty: every vertex in every round.
+  Eigen::VectorXi samples{};
 };
 
 struct Zoomout {
@@ -50,8 +45,9 @@ struct Zoomout {
 /// Refines a point map: each round makes a functional map of it, and a point map of that, with more
 /// functions than the round before. The defaults are the paper's.
 /// initial: one target vertex for each source vertex.
-/// Source: Melzi et al. 2019, "ZoomOut: Spectral Upsampling for Efficient Shape Correspondence".
-/// Errors: those of the two; `bad_option`; `cancelled`.
+/// Source: Melzi et al. 2019, "ZoomOut: Spectral Upsampling for Efficient Shape Correspondence"; the
+/// samples, its "Acceleration" (here of the source only, so that images stay as fine as the target).
+/// Errors: those of the two; `bad_option`; `index_out_of_range` for a sample; `cancelled`.
 Zoomout zoomout(const Eigenbasis& source, const Eigenbasis& target, const Eigen::VectorXi& initial,
                 const ZoomoutOptions& options = {}, ProgressRange progress = {});
 

@@ -40,10 +40,12 @@ MapScore map_score(const PreparedMesh& source, const PreparedMesh& target,
                    const Eigen::VectorXi& point_map);
 
 /// `zoomout` of a map of the callers' vertices. One without a face takes its nearest surface
-/// vertex's place, on either mesh. Errors: those of `zoomout`.
+/// vertex's place, on either mesh. options.samples: not given by the caller, but, if `sampled`, the
+/// source's prepared ones (every vertex where they are no more than options.to).
+/// Errors: those of `zoomout`.
 Eigen::VectorXi zoomout_map(const PreparedMesh& source, const PreparedMesh& target,
-                            const Eigen::VectorXi& point_map, const ZoomoutOptions& options = {},
-                            ProgressRange progress = {});
+                            const Eigen::VectorXi& point_map, ZoomoutOptions options = {},
+                            bool sampled = false, ProgressRange progress = {});
 
 /// From pairs of vertices that correspond, one or more: heat and wave kernels around them and wave
 /// kernel signatures, an orientation term, and ZoomOut that holds the pairs. The map has them

@@ -18,8 +18,11 @@ MapScore map_score(const PreparedMesh& source, const PreparedMesh& target,
 }
 
 Eigen::VectorXi zoomout_map(const PreparedMesh& source, const PreparedMesh& target,
-                            const Eigen::VectorXi& point_map, const ZoomoutOptions& options,
+                            const Eigen::VectorXi& point_map, ZoomoutOptions options, bool sampled,
                             ProgressRange progress) {
+  const Eigen::VectorXi& samples = source.sampled.samples;
+  const bool fewer = samples.size() > options.to && samples.size() < source.basis.mass.size();
+  options.samples = sampled && fewer ? samples : Eigen::VectorXi();
   const Eigen::VectorXi initial = refining::to_surfaces(
       source.mesh, target.mesh, refining::surface_anchor(target.mesh), point_map);
   const Zoomout refined = zoomout(source.basis, target.basis, initial, options, progress);

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Nearest neighbours among rows of many numbers, where search trees are of no use.
+#pragma once
+
+#include "supple/core/progress.h"
+#include "supple/core/types.h"
+
+namespace supple {
+
+/// For each row of `queries` (q x k), the nearest row of `points` (p x k, p >= 1) by Euclidean
+/// distance, ties to the lowest index: exactly what comparing every sum of squared differences in
+/// double precision finds. Products in single precision leave the few rows that this is done for.
+/// Memory: the points once more, and p floats for each of some hundred queries a thread.
+/// Errors: `wrong_shape`, `not_finite`; `cancelled`.
+Eigen::VectorXi nearest_rows(const RowMatrix<double>& queries, const RowMatrix<double>& points,
+                             ProgressRange progress = {});
+
+}  // namespace supple
