@@ -4,9 +4,11 @@
 Started by run_window.py in a window of 1280 x 800.
 """
 
+import faulthandler
 import sys
 from pathlib import Path
 
+faulthandler.enable()  # a crash shows where every thread was
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parent.parent)]
 
 import bodies  # noqa: E402
@@ -206,7 +208,7 @@ def cancel_long_work(robot):
     before = bodies.everything()
     yield from robot.click(*BAKE)
     yield from robot.wait_for(at_work, 5, "the bake at work")
-    yield from robot.wait(1.5)
+    yield from robot.wait(0.4)
     robot.screenshot("working.png")
     assert at_work(), "too quick to be cancelled; give this step a larger mesh"
     yield from robot.press("ESC")

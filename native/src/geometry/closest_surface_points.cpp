@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "supple/core/error.h"
+#include "supple/core/simd.h"
 #include "supple/geometry/mesh.h"
 #include "supple/geometry/surface_map.h"
 
@@ -18,15 +19,31 @@ namespace {
 using Vector = Eigen::RowVector3d;
 
 constexpr int kLeafFaces = 4;
-// Twice the deepest tree that halving 2^31 faces makes.
+constexpr int kWide = 4;  // children of a node that are looked at together
+// Three more wait at each level of the deepest tree that quartering 2^31 faces makes.
 constexpr size_t kStack = 64;
+// Boxes are compared in single precision: rounded outwards by so much of the largest coordinate,
+// and what they find taken for so much less. Both are several roundings.
+constexpr double kOutwards = 1e-6;
+constexpr float kShorter = 1.0F - 1e-5F;
 // Below this squared sine-like measure, which side of an edge a point is on is decided by rounding.
 constexpr double kThin = 1e-8;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 struct Triangle {
+  Triangle(const Vector& a_in, const Vector& b, const Vector& c, int face_in)
+      : a(a_in), ab(b - a_in), ac(c - a_in), face(face_in) {
+    const Vector cross = ab.cross(ac);
+    const double longest = std::max({ab.squaredNorm(), (ac - ab).squaredNorm(), ac.squaredNorm()});
+    thin = cross.squaredNorm() < kThin * longest * longest;
+    normal = cross.normalized();
+    const double size = std::sqrt(cross.squaredNorm());
+    grad_b = ac.cross(normal) / size;
+    grad_c = normal.cross(ab) / size;
+  }
+
   Vector a, ab, ac, normal;  // normal of length 1
-  double area_squared;       // |ab x ac|^2
+  Vector grad_b, grad_c;     // the second and third barycentric coordinates of p: (p - a) . grad
   bool thin;
   int face;
 };
@@ -53,9 +70,7 @@ void try_edge(const Vector& from, const Vector& along, const Vector& p, int c0, 
 Closest closest_point(const Triangle& t, const Vector& p) {
   const Vector ap = p - t.a;
   const double height = ap.dot(t.normal);
-  const double size = std::sqrt(t.area_squared);
-  const double c = t.ab.cross(ap).dot(t.normal) / size;
-  const double b = ap.cross(t.ac).dot(t.normal) / size;
+  const double b = ap.dot(t.grad_b), c = ap.dot(t.grad_c);
   const double a = 1.0 - b - c;
   if (!t.thin && a >= 0.0 && b >= 0.0 && c >= 0.0) {
     return {height * height, {a, b, c}};
@@ -88,21 +103,51 @@ struct Box {
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
   }
-  double squared_distance(const Vector& p) const {
-    return (low - p).cwiseMax(p - high).cwiseMax(0.0).squaredNorm();
-  }
-  // The largest p . direction of a point p inside.
-  double most_along(const Vector& direction) const {
-    return low.cwiseProduct(direction).cwiseMax(high.cwiseProduct(direction)).sum();
-  }
 };
 
-// A leaf's faces are [first, first + count); an inner node's children are the next node and
-// `right`.
-struct Node {
+// While the tree is built. A leaf's faces are [first, first + count); an inner node's children are
+// the next node and `right`.
+struct HalvedNode {
   Box box, normals;
   int first = 0, count = 0, right = 0;
 };
+
+using Four = Lanes<float, 16>::type;
+
+// Up to four children: node `first` where count is 0, faces [first, first + count) where it is
+// more; none where it is less.
+struct Node {
+  Four low[3], high[3], normal_low[3], normal_high[3];
+  std::array<int, kWide> first{}, count{-1, -1, -1, -1};
+
+  // Of p to each child's box, squared: no more than it is.
+  Four squared_distance(const Four (&p)[3]) const {
+    Four sum{};
+    for (int axis = 0; axis < 3; ++axis) {
+      const Four below = low[axis] - p[axis], above = p[axis] - high[axis];
+      Four away = below > above ? below : above;
+      away = away > 0.0F ? away : Four{};
+      sum += away * away;
+    }
+    return sum * kShorter;
+  }
+  // The largest cosine to a normal in each child: no less than it is.
+  Four most_along(const Four (&normal)[3]) const {
+    Four sum = Four{} + static_cast<float>(kOutwards);
+    for (int axis = 0; axis < 3; ++axis) {
+      const Four a = normal_low[axis] * normal[axis], b = normal_high[axis] * normal[axis];
+      sum += a > b ? a : b;
+    }
+    return sum;
+  }
+};
+
+// The same three numbers in all lanes.
+void spread(const Vector& v, Four (&lanes)[3]) {
+  for (int axis = 0; axis < 3; ++axis) {
+    lanes[axis] = Four{} + static_cast<float>(v[axis]);
+  }
+}
 
 struct Candidate {
   double squared;
@@ -126,15 +171,22 @@ struct ClosestSurfacePoints::Impl {
   // Those of order[from, to), below a new node.
   void build(const std::vector<Triangle>& all, const Points& centres, const std::vector<Box>& boxes,
              std::vector<int>& order, int from, int to);
+  // Makes a node of a halved node's children's children. Returns its place.
+  int widen(int index, double outwards);
   // All faces that may be the nearest and agree are left in `found`; what is there already bounds
   // the search. Returns the least squared distance.
   double search(const Vector& p, const Vector& normal, double cos_limit, double reach_squared,
                 std::vector<Candidate>& found) const;
   // The lowest face of the nearest ones in `found`.
   int choose(double squared, const std::vector<Candidate>& found) const;
+  int triangle_near(int face) const {
+    return face >= 0 && face < triangle_of.size() ? triangle_of[face] : -1;
+  }
   double limit(double squared) const { return squared * (1.0 + 1e-9) + tie; }
 
   std::vector<Triangle> triangles;  // in the order of the leaves
+  Eigen::VectorXi triangle_of;      // of each face; -1 without an area
+  std::vector<HalvedNode> halved;   // while it is built
   std::vector<Node> nodes;
   double tie = 0.0;  // squared distances this near to 0 are all 0
 };
@@ -154,11 +206,7 @@ ClosestSurfacePoints::Impl::Impl(const Points& vertices, const Faces& faces) {
     }
     const Vector a = vertices.row(faces(f, 0)), b = vertices.row(faces(f, 1)),
                  c = vertices.row(faces(f, 2));
-    const Vector cross = (b - a).cross(c - a);
-    const double longest =
-        std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
-    all.push_back({a, b - a, c - a, cross.normalized(), cross.squaredNorm(),
-                   cross.squaredNorm() < kThin * longest * longest, static_cast<int>(f)});
+    all.emplace_back(a, b, c, static_cast<int>(f));
     Box& box = boxes.emplace_back();
     box.add(a);
     box.add(b);
@@ -175,20 +223,26 @@ ClosestSurfacePoints::Impl::Impl(const Points& vertices, const Faces& faces) {
   }
   std::vector<int> order(all.size());
   std::iota(order.begin(), order.end(), 0);
-  nodes.reserve(all.size());
+  halved.reserve(all.size());
   build(all, centres, boxes, order, 0, static_cast<int>(order.size()));
   triangles.reserve(all.size());
+  triangle_of = Eigen::VectorXi::Constant(faces.rows(), -1);
   for (const int i : order) {
+    triangle_of[all[i].face] = static_cast<int>(triangles.size());
     triangles.push_back(all[i]);
   }
-  tie = 1e-18 * (nodes[0].box.high - nodes[0].box.low).squaredNorm();
+  const Box& whole = halved[0].box;
+  tie = 1e-18 * (whole.high - whole.low).squaredNorm();
+  nodes.reserve(halved.size() / 2 + 1);
+  widen(0, kOutwards * std::max(whole.low.cwiseAbs().maxCoeff(), whole.high.cwiseAbs().maxCoeff()));
+  halved = {};
 }
 
 void ClosestSurfacePoints::Impl::build(const std::vector<Triangle>& all, const Points& centres,
                                        const std::vector<Box>& boxes, std::vector<int>& order,
                                        int from, int to) {
-  const size_t node = nodes.size();
-  nodes.emplace_back();
+  const size_t node = halved.size();
+  halved.emplace_back();
   Box box, spread, normals;
   for (int i = from; i < to; ++i) {
     box.add(boxes[order[i]].low);
@@ -196,11 +250,11 @@ void ClosestSurfacePoints::Impl::build(const std::vector<Triangle>& all, const P
     spread.add(centres.row(order[i]));
     normals.add(all[order[i]].normal);
   }
-  nodes[node].box = box;
-  nodes[node].normals = normals;
+  halved[node].box = box;
+  halved[node].normals = normals;
   if (to - from <= kLeafFaces) {
-    nodes[node].first = from;
-    nodes[node].count = to - from;
+    halved[node].first = from;
+    halved[node].count = to - from;
     return;
   }
   int axis = 0;
@@ -211,8 +265,36 @@ void ClosestSurfacePoints::Impl::build(const std::vector<Triangle>& all, const P
                      return std::pair(centres(i, axis), i) < std::pair(centres(j, axis), j);
                    });
   build(all, centres, boxes, order, from, middle);
-  nodes[node].right = static_cast<int>(nodes.size());
+  halved[node].right = static_cast<int>(halved.size());
   build(all, centres, boxes, order, middle, to);
+}
+
+int ClosestSurfacePoints::Impl::widen(int index, double outwards) {
+  const auto children_of = [&](int i) -> std::vector<int> {
+    const HalvedNode& node = halved[static_cast<size_t>(i)];
+    return node.count > 0 ? std::vector<int>{i} : std::vector<int>{i + 1, node.right};
+  };
+  std::vector<int> children;
+  for (const int child : children_of(index)) {
+    const std::vector<int> below = child == index ? std::vector<int>{child} : children_of(child);
+    children.insert(children.end(), below.begin(), below.end());
+  }
+  const size_t place = nodes.size();
+  nodes.emplace_back();
+  for (size_t c = 0; c < children.size(); ++c) {
+    const HalvedNode& child = halved[static_cast<size_t>(children[c])];
+    for (int axis = 0; axis < 3; ++axis) {
+      nodes[place].low[axis][c] = static_cast<float>(child.box.low[axis] - outwards);
+      nodes[place].high[axis][c] = static_cast<float>(child.box.high[axis] + outwards);
+      nodes[place].normal_low[axis][c] = static_cast<float>(child.normals.low[axis] - kOutwards);
+      nodes[place].normal_high[axis][c] = static_cast<float>(child.normals.high[axis] + kOutwards);
+    }
+    const bool leaf = child.count > 0;
+    const int first = leaf ? child.first : widen(children[c], outwards);
+    nodes[place].first[c] = first;
+    nodes[place].count[c] = leaf ? child.count : 0;
+  }
+  return static_cast<int>(place);
 }
 
 double ClosestSurfacePoints::Impl::search(const Vector& p, const Vector& normal, double cos_limit,
@@ -223,38 +305,55 @@ double ClosestSurfacePoints::Impl::search(const Vector& p, const Vector& normal,
     best = std::min(best, known.squared);
   }
   const bool any_normal = normal.isZero(0.0);
-  std::array<std::pair<double, int>, kStack> stack;
+  Four place[3], direction[3];
+  spread(p, place);
+  spread(normal, direction);
+  const auto look_at = [&](int i) {
+    const Triangle& triangle = triangles[static_cast<size_t>(i)];
+    if (!any_normal && triangle.normal.dot(normal) < cos_limit) {
+      return;
+    }
+    const double height = (p - triangle.a).dot(triangle.normal);
+    if (height * height > limit(best)) {
+      return;
+    }
+    const double squared = closest_point(triangle, p).squared;
+    if (squared <= limit(best)) {
+      found.push_back({squared, i});
+      best = std::min(best, squared);
+    }
+  };
+  struct Waiting {
+    float squared;
+    int first, count;
+  };
+  std::array<Waiting, kStack> stack;
   size_t waiting = 0;
-  stack[waiting++] = {nodes[0].box.squared_distance(p), 0};
+  stack[waiting++] = {0.0F, 0, 0};
   while (waiting > 0) {
-    const auto [distance, index] = stack[--waiting];
-    if (distance > limit(best)) {
+    const Waiting now = stack[--waiting];
+    if (now.squared > limit(best)) {
       continue;
     }
-    const Node& node = nodes[index];
-    if (!any_normal && node.normals.most_along(normal) < cos_limit) {
-      continue;
-    }
-    if (node.count > 0) {
-      for (int i = node.first; i < node.first + node.count; ++i) {
-        if (!any_normal && triangles[i].normal.dot(normal) < cos_limit) {
-          continue;
-        }
-        const double squared = closest_point(triangles[i], p).squared;
-        if (squared <= limit(best)) {
-          found.push_back({squared, i});
-          best = std::min(best, squared);
-        }
+    if (now.count > 0) {
+      for (int i = now.first; i < now.first + now.count; ++i) {
+        look_at(i);
       }
       continue;
     }
-    std::pair<double, int> left{nodes[index + 1].box.squared_distance(p), index + 1};
-    std::pair<double, int> right{nodes[node.right].box.squared_distance(p), node.right};
-    if (left.first < right.first) {
-      std::swap(left, right);
+    const Node& node = nodes[static_cast<size_t>(now.first)];
+    const Four squared = node.squared_distance(place), along = node.most_along(direction);
+    const size_t bottom = waiting;
+    for (int c = 0; c < kWide; ++c) {
+      if (node.count[c] < 0 || squared[c] > limit(best) || (!any_normal && along[c] < cos_limit)) {
+        continue;
+      }
+      size_t at = waiting++;  // the nearest on top: it is looked at first
+      for (; at > bottom && stack[at - 1].squared < squared[c]; --at) {
+        stack[at] = stack[at - 1];
+      }
+      stack[at] = {squared[c], node.first[c], node.count[c]};
     }
-    stack[waiting++] = left;
-    stack[waiting++] = right;  // the nearer one is looked at first
   }
   return best;
 }
@@ -284,7 +383,8 @@ ClosestSurfacePoints::Result ClosestSurfacePoints::query(const Points& points) c
 
 ClosestSurfacePoints::Result ClosestSurfacePoints::query(const Points& points,
                                                          const Points& normals, double cos_limit,
-                                                         double reach) const {
+                                                         double reach,
+                                                         const Eigen::VectorXi& near) const {
   if (normals.rows() != points.rows()) {
     throw Error(ErrorCode::wrong_shape, "There are " + std::to_string(normals.rows()) +
                                             " normals for " + std::to_string(points.rows()) +
@@ -294,6 +394,11 @@ ClosestSurfacePoints::Result ClosestSurfacePoints::query(const Points& points,
     throw Error(ErrorCode::bad_option,
                 "Normals agree from a cosine in [-1, 1] on, within a reach of at least 0; not " +
                     std::to_string(cos_limit) + " and " + std::to_string(reach) + ".");
+  }
+  if (near.size() != 0 && near.size() != points.rows()) {
+    throw Error(ErrorCode::wrong_shape, "There are " + std::to_string(near.size()) +
+                                            " faces to start from for " +
+                                            std::to_string(points.rows()) + " points.");
   }
   check_finite(points, "Point");
   check_finite(normals, "Normal");
@@ -307,11 +412,15 @@ ClosestSurfacePoints::Result ClosestSurfacePoints::query(const Points& points,
 #pragma omp for schedule(dynamic, 256)
     for (Eigen::Index i = 0; i < count; ++i) {
       const Vector p = points.row(i);
+      const int start = near.size() > 0 ? impl_->triangle_near(near[i]) : former;
       const auto look = [&](const Vector& normal, double limit) {
         found.clear();
-        if (former >= 0 && limit == kInfinity &&
-            (normal.isZero(0.0) || impl_->triangles[former].normal.dot(normal) >= cos_limit)) {
-          found.push_back({closest_point(impl_->triangles[former], p).squared, former});
+        if (start >= 0 &&
+            (normal.isZero(0.0) || impl_->triangles[start].normal.dot(normal) >= cos_limit)) {
+          const double squared = closest_point(impl_->triangles[start], p).squared;
+          if (squared <= limit * limit) {
+            found.push_back({squared, start});
+          }
         }
         const double best = impl_->search(p, normal, cos_limit, limit * limit, found);
         return found.empty() ? -1 : impl_->choose(best, found);

@@ -149,6 +149,36 @@ TEST(ClosestSurfacePoints, NormalsChooseTheSideOfAThinPlate) {
   EXPECT_FALSE(nowhere.agrees.any());
 }
 
+TEST_P(EverySurface, FacesToStartFromChangeNothing) {
+  const zoo::Mesh& mesh = GetParam().mesh;
+  const Points queries = queries_for(mesh);
+  const Points normals = Points(test::noise(queries.rows(), 3, 5)).rowwise().normalized();
+  const ClosestSurfacePoints surface(mesh.vertices, mesh.faces);
+  Eigen::VectorXi near(queries.rows());
+  for (Eigen::Index i = 0; i < near.size(); ++i) {
+    near[i] = static_cast<int>(7 * i % mesh.faces.rows());
+  }
+  const double reach = 0.3 * test::diagonal(mesh.vertices);
+  const Result from_none = surface.query(queries, normals, 0.2, reach);
+  const Result result = surface.query(queries, normals, 0.2, reach, near);
+  EXPECT_EQ(result.map.face, from_none.map.face);
+  EXPECT_EQ(result.squared_distance, from_none.squared_distance);
+  EXPECT_TRUE((result.agrees == from_none.agrees).all());
+}
+
+TEST(ClosestSurfacePoints, FarFromTheOriginItIsAsExact) {
+  zoo::Mesh mesh = zoo::perturbed_sphere(2, 3);
+  const Points queries = queries_for(mesh);
+  const Result here = ClosestSurfacePoints(mesh.vertices, mesh.faces).query(queries);
+  const Eigen::RowVector3d away(4096.0, -8192.0, 1024.0);
+  const Result there = ClosestSurfacePoints(mesh.vertices.rowwise() + away, mesh.faces)
+                           .query(queries.rowwise() + away);
+  EXPECT_LT((here.squared_distance.cwiseSqrt() - there.squared_distance.cwiseSqrt())
+                .cwiseAbs()
+                .maxCoeff(),
+            1e-10);
+}
+
 TEST(ClosestSurfacePoints, SaysWhatIsWrong) {
   const zoo::Mesh mesh = zoo::tetrahedron();
   const ClosestSurfacePoints closest(mesh.vertices, mesh.faces);

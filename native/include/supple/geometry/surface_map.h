@@ -65,10 +65,12 @@ class ClosestSurfacePoints {
   Result query(const Points& points) const;
   /// The nearest point among faces whose unit normal n has n . normal >= cos_limit, within `reach`
   /// (in the points' units); where there is none, the nearest of all, with `agrees` false. normals:
-  /// q x 3, of length 1, or 0 to agree with every face. Errors: `wrong_shape`, `not_finite`,
+  /// q x 3, of length 1, or 0 to agree with every face. near: q faces where the search starts, or
+  /// none: the answer is the same, sooner where they are near. Errors: `wrong_shape`, `not_finite`,
   /// `bad_option` for a cos_limit outside [-1, 1] or a reach below 0.
   Result query(const Points& points, const Points& normals, double cos_limit,
-               double reach = std::numeric_limits<double>::infinity()) const;
+               double reach = std::numeric_limits<double>::infinity(),
+               const Eigen::VectorXi& near = {}) const;
 
  private:
   struct Impl;

@@ -142,7 +142,8 @@ void Refiner::Impl::place(State& state, RefineReport& report) const {
   }
   const Stopwatch watch(report.nearest_milliseconds);
   const Points normals = vertex_normals(state.moved, source->operators.faces);
-  state.on = closest.query(state.moved, normals, options.facing, options.facing_reach).map;
+  state.on =
+      closest.query(state.moved, normals, options.facing, options.facing_reach, state.on.face).map;
   state.vertices = nearest_corners(state.on, surface.faces);
 }
 
