@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shape keys carried from a coarse body to a fine one, against the true ones.
 
-    python -m supple_training.shape_transfer [--vertices 3000] [--seed 0]
+    python -m supple_training.shape_transfer [--vertices 3000] [--seed 0] [--pictures DIR]
 
 A body is triangulated again with few vertices, so its keys are known on both meshes: another
 figure, poses. Printed for each key, beside what copying offsets does: RMS error, in thousandths of
 the root of the area, and roughness, the RMS error of the deformation's Jacobians, in which
-stair-steps are large however low they are.
+stair-steps are large however low they are. With --pictures, DIR/KEY.png shows the target with the
+true key and with each method's, smoothly shaded, so that steps show as facets.
 """
 
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 import numpy as np
 import scipy.spatial
@@ -56,10 +58,31 @@ class Judge:
         return float(np.sqrt(self._areas @ squared / self._areas.sum()))
 
 
+PIXELS = 900
+"""Height of a picture."""
+
+
+def draw(faces: IntArray, shown: dict[str, FloatArray], path: Path) -> None:
+    """Write the shapes side by side as PNG, from the front, all at one scale."""
+    import matplotlib.image
+
+    from .compare.edits import raster
+
+    upright = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # Z up, as Y up
+    shown = {name: points @ upright for name, points in shown.items()}
+    view = raster.camera(list(shown.values()), elevation=5.0, turn=20.0)
+    width = round(PIXELS * view.extent[0] / view.extent[1])
+    grey = np.full((len(faces), 3), 0.86)
+    images = [raster.render(points, faces, grey, view, width) for points in shown.values()]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    matplotlib.image.imsave(path, np.clip(np.concatenate(images, axis=1), 0.0, 1.0))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--vertices", type=int, default=3000, help="of the coarse body")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--pictures", type=Path, help="folder for a picture of each key")
     options = parser.parse_args()
 
     rng = np.random.default_rng(options.seed)
@@ -93,6 +116,10 @@ def main() -> None:
         for method, moved in rows.items():
             rms, roughness = judge.rms(moved, truth), judge.roughness(moved, truth)
             print(f"{name:8} {method:24} {rms:7.3f} {roughness:8.3f}")
+        if options.pictures:
+            path = options.pictures / f"{name.replace(' ', '_')}.png"
+            draw(faces, {"truth": truth, **rows}, path)
+            print(f"wrote {path}: {', '.join(['truth', *rows])}")
 
 
 if __name__ == "__main__":
