@@ -11,6 +11,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 import install
+import pairs
 
 
 @pytest.fixture(scope="session")
@@ -28,3 +29,9 @@ def addon(package):
 @pytest.fixture(autouse=True)
 def empty_file(package):
     bpy.ops.wm.read_homefile(use_empty=True)
+
+
+@pytest.fixture
+def pair():
+    """A body, its copy in another order, and that order."""
+    return pairs.bare_pair()

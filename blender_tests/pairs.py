@@ -193,6 +193,12 @@ def match_error(target, source, order):
     return float(np.linalg.norm(partners(target, source) - truth, axis=1).mean())
 
 
+def error(pair):
+    """match_error of what bare_pair returned."""
+    body, scan, order = pair
+    return match_error(scan, body, order)
+
+
 def transfer(*parts, **settings):
     panel = bpy.context.scene.supple_match
     panel.transfer = set(parts)

@@ -8,16 +8,6 @@ import pairs
 import pytest
 
 
-@pytest.fixture
-def pair():
-    return pairs.bare_pair()
-
-
-def error(pair):
-    body, scan, order = pair
-    return pairs.match_error(scan, body, order)
-
-
 def move(obj):
     obj.matrix_world = bodies.rigid_motion()
     obj.scale = (1.7, 1.7, 1.7)
@@ -27,7 +17,7 @@ def test_nearest_as_they_lie_is_exact(pair):
     body, scan, order = pair
     pairs.choose(body, scan, refine=False)
     assert bpy.ops.supple.match() == {"FINISHED"}
-    assert error(pair) < 1e-5
+    assert pairs.error(pair) < 1e-5
     assert scan.supple_map.source == body
     assert scan.supple_map.confidence > 0.9
     assert bodies.rest(scan).tobytes() == bodies.rest(body)[order].tobytes()
@@ -41,7 +31,7 @@ def test_nearest_takes_the_objects_places_and_scales(pair):
     scan.matrix_world = bodies.rigid_motion() @ bodies.rigid_motion()
     pairs.choose(body, scan, refine=False)
     bpy.ops.supple.match()
-    assert error(pair) < 1e-4
+    assert pairs.error(pair) < 1e-4
 
 
 @pytest.mark.parametrize("start", ["AUTOMATIC", "ALIGNED"])
@@ -49,7 +39,7 @@ def test_starts_that_need_nothing_find_a_moved_copy(pair, start):
     move(pair[1])
     pairs.choose(pair[0], pair[1], start)
     bpy.ops.supple.match()
-    assert error(pair) < 0.05
+    assert pairs.error(pair) < 0.05
     assert pair[1].supple_map.confidence > 0.8
 
 
@@ -64,7 +54,7 @@ def test_landmarks_find_a_posed_copy(pair):
         bpy.ops.supple.landmark_add(source_vertex=source_vertex, target_vertex=target_vertex)
     assert len(panel.pairs) == 4
     bpy.ops.supple.match()
-    assert error(pair) < 0.1
+    assert pairs.error(pair) < 0.1
 
 
 def test_shared_uvs(pair):
@@ -79,7 +69,7 @@ def test_shared_uvs(pair):
     move(scan)
     pairs.choose(body, scan, "UVS", refine=False)
     bpy.ops.supple.match()
-    assert error(pair) < 0.05
+    assert pairs.error(pair) < 0.05
 
 
 def test_another_triangulation():
@@ -112,9 +102,9 @@ def test_refining_makes_a_rough_match_better(pair):
         near = np.flatnonzero(np.linalg.norm(where - where[vertex], axis=1) < 0.5)
         faces[vertex] = faces[random.choice(near)]
     scan.data.attributes["Supple Match Face"].data.foreach_set("value", faces)
-    rough = error(pair)
+    rough = pairs.error(pair)
     assert bpy.ops.supple.refine_match() == {"FINISHED"}
-    assert rough > 0.2 and error(pair) < 0.5 * rough
+    assert rough > 0.2 and pairs.error(pair) < 0.5 * rough
 
 
 def test_ngons_and_edit_mode():
@@ -133,7 +123,7 @@ def test_a_modifier_comes_after_the_match(pair):
     body.modifiers.new("Mirror", "MIRROR")
     pairs.choose(body, scan, refine=False)
     bpy.ops.supple.match()
-    assert error(pair) < 1e-5
+    assert pairs.error(pair) < 1e-5
 
 
 def test_shape_keys_that_are_on_do_not_count(pair):
@@ -142,7 +132,7 @@ def test_shape_keys_that_are_on_do_not_count(pair):
     body.data.shape_keys.key_blocks["Bend"].value = 1.0
     pairs.choose(body, scan, refine=False)
     bpy.ops.supple.match()
-    assert error(pair) < 1e-5
+    assert pairs.error(pair) < 1e-5
 
 
 def test_what_is_not_chosen_is_taken_from_the_selection(pair):

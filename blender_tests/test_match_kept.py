@@ -8,16 +8,6 @@ import pairs
 import pytest
 
 
-@pytest.fixture
-def pair():
-    return pairs.bare_pair()
-
-
-def error(pair):
-    body, scan, order = pair
-    return pairs.match_error(scan, body, order)
-
-
 def test_a_changed_mesh_is_named(pair):
     body, scan, _ = pair
     pairs.choose(body, scan, refine=False)
@@ -118,7 +108,7 @@ def test_swap_turns_the_match_round(pair):
     assert not [a.name for a in scan.data.attributes if a.name.startswith("Supple")]
     bpy.ops.supple.refine_match()
     bpy.ops.supple.match_swap()
-    assert error(pair) < 0.05
+    assert pairs.error(pair) < 0.05
 
 
 def test_swap_without_a_match(pair):

@@ -183,12 +183,10 @@ def read(path, out=None):
         keep_volume=options.take("keep_volume", bool, True),
         key=output.take("shape_key", str, required=True),
         overwrite=output.take("overwrite", bool, False),
-        blend=output.path("blend", out, required=True),
+        blend=output.path("blend", out, required=True, suffix=".blend"),
         report=output.path("report", out),
         render=_render(top.table("render"), out),
     )
     for table in (options, output, top):
         table.end()
-    if job.blend.suffix != ".blend":
-        raise output.error("blend", f"must end in .blend, not '{job.blend.name}'")
     return job

@@ -23,6 +23,14 @@ def open_blend(path, file):
         raise UserError(f"{file}: input.blend: {error}") from error
 
 
+def scene_object(name, file, key):
+    """Return the object of the scene that `key` of job file `file` names."""
+    scene = bpy.context.scene
+    if name not in scene.objects:
+        raise UserError(f"{file}: {key}: there is no object '{name}' in the scene '{scene.name}'")
+    return scene.objects[name]
+
+
 @contextmanager
 def all_or_nothing(targets):
     """Yield {target: path to write to}; on success they take the targets' places, else they go."""

@@ -65,13 +65,7 @@ def _find(source, file):
         job_output.open_blend(source.blend, file)
     if not source.object:
         return bpy.context.view_layer.objects.active
-    obj = bpy.context.scene.objects.get(source.object)
-    if obj is None:
-        raise UserError(
-            f"{file}: input.object: there is no object '{source.object}' in the scene "
-            f"'{bpy.context.scene.name}'"
-        )
-    return obj
+    return job_output.scene_object(source.object, file, "input.object")
 
 
 def _add_groups(obj, path, file):

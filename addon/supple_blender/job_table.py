@@ -48,10 +48,15 @@ class Table:
             raise self.error(key, f"must be one of {', '.join(options)}, not '{value}'")
         return value
 
-    def path(self, key, folder, *, required=False):
-        """Return a path, taken from `folder` if it is relative, or None."""
+    def path(self, key, folder, *, required=False, suffix=""):
+        """Return a path that ends in suffix, taken from `folder` if it is relative, or None."""
         value = self.take(key, str, required=required)
-        return None if value is None else folder / value
+        if value is None:
+            return None
+        path = folder / value
+        if suffix and path.suffix != suffix:
+            raise self.error(key, f"must end in {suffix}, not '{path.name}'")
+        return path
 
     def numbers(self, key, shape):
         """Return an array of finite numbers of this shape, or None."""

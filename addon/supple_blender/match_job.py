@@ -85,7 +85,7 @@ def read(path, out=None):
         targets=targets,
         options=_options(table, folder, targets),
         transfer=_transfer(table),
-        blend=output.path("blend", out, required=True),
+        blend=output.path("blend", out, required=True, suffix=".blend"),
         report=output.path("report", out),
     )
     for each in (given, table, output, top):
@@ -94,6 +94,4 @@ def read(path, out=None):
         raise given.error("blend", f"there is no file {job.input}")
     if job.source in targets:
         raise table.error("targets", f"'{job.source}' is the source")
-    if job.blend.suffix != ".blend":
-        raise output.error("blend", f"must end in .blend, not '{job.blend.name}'")
     return job

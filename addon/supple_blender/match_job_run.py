@@ -12,14 +12,9 @@ from .stages import Stages
 
 def _find(job):
     """Return the source and the targets, as objects."""
-    objects = bpy.context.scene.objects
-    for key, name in (("source", job.source), *(("targets", name) for name in job.targets)):
-        if name not in objects:
-            raise UserError(
-                f"{job.path}: match.{key}: there is no object '{name}' in the scene "
-                f"'{bpy.context.scene.name}'"
-            )
-    return objects[job.source], [objects[name] for name in job.targets]
+    source = job_output.scene_object(job.source, job.path, "match.source")
+    targets = [job_output.scene_object(name, job.path, "match.targets") for name in job.targets]
+    return source, targets
 
 
 def _report(job, done, failed, seconds):
