@@ -112,7 +112,7 @@ def transfer_and_undo(robot):
 
 def cancel_a_match(robot):
     with in_view(robot):
-        bpy.ops.mesh.primitive_uv_sphere_add(segments=200, ring_count=160, radius=1)
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=256, ring_count=200, radius=1)
     settings().target, settings().start = bpy.context.object, "AUTOMATIC"
     bpy.ops.ed.undo_push(message="Ball")
     background = sys.modules["supple_blender.background"]
@@ -120,7 +120,7 @@ def cancel_a_match(robot):
     with in_view(robot):
         bpy.ops.supple.match("INVOKE_DEFAULT")
     yield from robot.wait_for(lambda: background.running is not None, 5, "the match at work")
-    yield from robot.wait(1)
+    yield from robot.wait(0.2)
     assert background.running, "too quick to be cancelled; give this step a larger mesh"
     robot.screenshot("matching.png")
     yield from robot.press("ESC")

@@ -208,7 +208,7 @@ def cancel_long_work(robot):
     before = bodies.everything()
     yield from robot.click(*BAKE)
     yield from robot.wait_for(at_work, 5, "the bake at work")
-    yield from robot.wait(0.4)
+    yield from robot.wait(0.2)
     robot.screenshot("working.png")
     assert at_work(), "too quick to be cancelled; give this step a larger mesh"
     yield from robot.press("ESC")

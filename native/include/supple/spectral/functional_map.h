@@ -45,8 +45,8 @@ struct Zoomout {
 /// Refines a point map: each round makes a functional map of it, and a point map of that, with more
 /// functions than the round before. The defaults are the paper's.
 /// initial: one target vertex for each source vertex.
-/// Source: Melzi et al. 2019, "ZoomOut: Spectral Upsampling for Efficient Shape Correspondence"; the
-/// samples, its "Acceleration" (here of the source only, so that images stay as fine as the target).
+/// Source: Melzi et al. 2019, "ZoomOut: Spectral Upsampling for Efficient Shape Correspondence",
+/// and its "Acceleration" for the samples (of the source only: images stay as fine as the target).
 /// Errors: those of the two; `bad_option`; `index_out_of_range` for a sample; `cancelled`.
 Zoomout zoomout(const Eigenbasis& source, const Eigenbasis& target, const Eigen::VectorXi& initial,
                 const ZoomoutOptions& options = {}, ProgressRange progress = {});
