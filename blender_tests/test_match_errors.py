@@ -9,11 +9,6 @@ import pytest
 import refusing
 
 
-@pytest.fixture
-def pair():
-    return pairs.bare_pair()
-
-
 def refuse(match):
     refusing.refuse(bpy.ops.supple.match, match)
 

@@ -25,6 +25,9 @@ from . import bodies, remesh
 FloatArray = bodies.FloatArray
 IntArray = bodies.IntArray
 
+PIXELS = 900
+"""Height of a picture."""
+
 
 def keys_of(phenotype: FloatArray, seed: int) -> dict[str, FloatArray]:
     """True shapes of one body by name: stronger and heavier, and two random poses."""
@@ -56,10 +59,6 @@ class Judge:
         ) - supple.geometry.jacobians(self._rest, self._faces, truth)
         squared = np.sum(difference**2, axis=(1, 2))
         return float(np.sqrt(self._areas @ squared / self._areas.sum()))
-
-
-PIXELS = 900
-"""Height of a picture."""
 
 
 def draw(faces: IntArray, shown: dict[str, FloatArray], path: Path) -> None:

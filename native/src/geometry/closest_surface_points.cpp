@@ -35,9 +35,9 @@ struct Triangle {
       : a(a_in), ab(b - a_in), ac(c - a_in), face(face_in) {
     const Vector cross = ab.cross(ac);
     const double longest = std::max({ab.squaredNorm(), (ac - ab).squaredNorm(), ac.squaredNorm()});
-    thin = cross.squaredNorm() < kThin * longest * longest;
-    normal = cross.normalized();
-    const double size = std::sqrt(cross.squaredNorm());
+    const double squared = cross.squaredNorm(), size = std::sqrt(squared);
+    thin = squared < kThin * longest * longest;
+    normal = cross / size;
     grad_b = ac.cross(normal) / size;
     grad_c = normal.cross(ab) / size;
   }
@@ -105,11 +105,65 @@ struct Box {
   }
 };
 
-// While the tree is built. A leaf's faces are [first, first + count); an inner node's children are
-// the next node and `right`.
+// A leaf's faces are order[first, first + count); an inner node's children are the next node and
+// `right`.
 struct HalvedNode {
   Box box, normals;
   int first = 0, count = 0, right = 0;
+};
+
+// Faces in a tree by halving. What Node is made from, four children at a time.
+struct HalvedTree {
+  HalvedTree(const std::vector<Triangle>& triangles, const std::vector<Box>& boxes)
+      : order(triangles.size()), centres(static_cast<Eigen::Index>(triangles.size()), 3) {
+    for (size_t i = 0; i < boxes.size(); ++i) {
+      centres.row(static_cast<Eigen::Index>(i)) = 0.5 * (boxes[i].low + boxes[i].high);
+    }
+    std::iota(order.begin(), order.end(), 0);
+    nodes.reserve(triangles.size());
+    add(triangles, boxes, 0, static_cast<int>(order.size()));
+  }
+
+  // A node of order[from, to), and all below it.
+  void add(const std::vector<Triangle>& triangles, const std::vector<Box>& boxes, int from,
+           int to) {
+    const size_t node = nodes.size();
+    nodes.emplace_back();
+    Box box, spread, normals;
+    for (int i = from; i < to; ++i) {
+      box.add(boxes[order[i]].low);
+      box.add(boxes[order[i]].high);
+      spread.add(centres.row(order[i]));
+      normals.add(triangles[order[i]].normal);
+    }
+    nodes[node].box = box;
+    nodes[node].normals = normals;
+    if (to - from <= kLeafFaces) {
+      nodes[node].first = from;
+      nodes[node].count = to - from;
+      return;
+    }
+    int axis = 0;
+    (spread.high - spread.low).maxCoeff(&axis);
+    const int middle = from + (to - from) / 2;
+    std::nth_element(order.begin() + from, order.begin() + middle, order.begin() + to,
+                     [&](int i, int j) {
+                       return std::pair(centres(i, axis), i) < std::pair(centres(j, axis), j);
+                     });
+    add(triangles, boxes, from, middle);
+    nodes[node].right = static_cast<int>(nodes.size());
+    add(triangles, boxes, middle, to);
+  }
+
+  // A leaf itself, or its two.
+  std::vector<int> children_of(int index) const {
+    const HalvedNode& node = nodes[static_cast<size_t>(index)];
+    return node.count > 0 ? std::vector<int>{index} : std::vector<int>{index + 1, node.right};
+  }
+
+  std::vector<HalvedNode> nodes;
+  std::vector<int> order;
+  Points centres;
 };
 
 using Four = Lanes<float, 16>::type;
@@ -168,11 +222,8 @@ void check_finite(const Points& points, const char* what) {
 struct ClosestSurfacePoints::Impl {
   Impl(const Points& vertices, const Faces& faces);
 
-  // Those of order[from, to), below a new node.
-  void build(const std::vector<Triangle>& all, const Points& centres, const std::vector<Box>& boxes,
-             std::vector<int>& order, int from, int to);
   // Makes a node of a halved node's children's children. Returns its place.
-  int widen(int index, double outwards);
+  int widen(const HalvedTree& halved, int index, double outwards);
   // All faces that may be the nearest and agree are left in `found`; what is there already bounds
   // the search. Returns the least squared distance.
   double search(const Vector& p, const Vector& normal, double cos_limit, double reach_squared,
@@ -186,7 +237,6 @@ struct ClosestSurfacePoints::Impl {
 
   std::vector<Triangle> triangles;  // in the order of the leaves
   Eigen::VectorXi triangle_of;      // of each face; -1 without an area
-  std::vector<HalvedNode> halved;   // while it is built
   std::vector<Node> nodes;
   double tie = 0.0;  // squared distances this near to 0 are all 0
 };
@@ -217,72 +267,30 @@ ClosestSurfacePoints::Impl::Impl(const Points& vertices, const Faces& faces) {
                 "None of the " + std::to_string(faces.rows()) +
                     " faces has an area, so there is no surface to find a point on.");
   }
-  Points centres(static_cast<Eigen::Index>(all.size()), 3);
-  for (size_t i = 0; i < all.size(); ++i) {
-    centres.row(static_cast<Eigen::Index>(i)) = 0.5 * (boxes[i].low + boxes[i].high);
-  }
-  std::vector<int> order(all.size());
-  std::iota(order.begin(), order.end(), 0);
-  halved.reserve(all.size());
-  build(all, centres, boxes, order, 0, static_cast<int>(order.size()));
+  const HalvedTree halved(all, boxes);
   triangles.reserve(all.size());
   triangle_of = Eigen::VectorXi::Constant(faces.rows(), -1);
-  for (const int i : order) {
+  for (const int i : halved.order) {
     triangle_of[all[i].face] = static_cast<int>(triangles.size());
     triangles.push_back(all[i]);
   }
-  const Box& whole = halved[0].box;
+  const Box& whole = halved.nodes[0].box;
   tie = 1e-18 * (whole.high - whole.low).squaredNorm();
-  nodes.reserve(halved.size() / 2 + 1);
-  widen(0, kOutwards * std::max(whole.low.cwiseAbs().maxCoeff(), whole.high.cwiseAbs().maxCoeff()));
-  halved = {};
+  nodes.reserve(halved.nodes.size() / 2 + 1);
+  widen(halved, 0,
+        kOutwards * std::max(whole.low.cwiseAbs().maxCoeff(), whole.high.cwiseAbs().maxCoeff()));
 }
 
-void ClosestSurfacePoints::Impl::build(const std::vector<Triangle>& all, const Points& centres,
-                                       const std::vector<Box>& boxes, std::vector<int>& order,
-                                       int from, int to) {
-  const size_t node = halved.size();
-  halved.emplace_back();
-  Box box, spread, normals;
-  for (int i = from; i < to; ++i) {
-    box.add(boxes[order[i]].low);
-    box.add(boxes[order[i]].high);
-    spread.add(centres.row(order[i]));
-    normals.add(all[order[i]].normal);
-  }
-  halved[node].box = box;
-  halved[node].normals = normals;
-  if (to - from <= kLeafFaces) {
-    halved[node].first = from;
-    halved[node].count = to - from;
-    return;
-  }
-  int axis = 0;
-  (spread.high - spread.low).maxCoeff(&axis);
-  const int middle = from + (to - from) / 2;
-  std::nth_element(order.begin() + from, order.begin() + middle, order.begin() + to,
-                   [&](int i, int j) {
-                     return std::pair(centres(i, axis), i) < std::pair(centres(j, axis), j);
-                   });
-  build(all, centres, boxes, order, from, middle);
-  halved[node].right = static_cast<int>(halved.size());
-  build(all, centres, boxes, order, middle, to);
-}
-
-int ClosestSurfacePoints::Impl::widen(int index, double outwards) {
-  const auto children_of = [&](int i) -> std::vector<int> {
-    const HalvedNode& node = halved[static_cast<size_t>(i)];
-    return node.count > 0 ? std::vector<int>{i} : std::vector<int>{i + 1, node.right};
-  };
+int ClosestSurfacePoints::Impl::widen(const HalvedTree& halved, int index, double outwards) {
   std::vector<int> children;
-  for (const int child : children_of(index)) {
-    const std::vector<int> below = child == index ? std::vector<int>{child} : children_of(child);
+  for (const int child : halved.children_of(index)) {
+    const std::vector<int> below = halved.children_of(child);
     children.insert(children.end(), below.begin(), below.end());
   }
   const size_t place = nodes.size();
   nodes.emplace_back();
   for (size_t c = 0; c < children.size(); ++c) {
-    const HalvedNode& child = halved[static_cast<size_t>(children[c])];
+    const HalvedNode& child = halved.nodes[static_cast<size_t>(children[c])];
     for (int axis = 0; axis < 3; ++axis) {
       nodes[place].low[axis][c] = static_cast<float>(child.box.low[axis] - outwards);
       nodes[place].high[axis][c] = static_cast<float>(child.box.high[axis] + outwards);
@@ -290,7 +298,7 @@ int ClosestSurfacePoints::Impl::widen(int index, double outwards) {
       nodes[place].normal_high[axis][c] = static_cast<float>(child.normals.high[axis] + kOutwards);
     }
     const bool leaf = child.count > 0;
-    const int first = leaf ? child.first : widen(children[c], outwards);
+    const int first = leaf ? child.first : widen(halved, children[c], outwards);
     nodes[place].first[c] = first;
     nodes[place].count[c] = leaf ? child.count : 0;
   }

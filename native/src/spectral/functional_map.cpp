@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "supple/core/dense.h"
 #include "supple/core/error.h"
@@ -109,29 +110,25 @@ Zoomout zoomout(const Eigenbasis& source, const Eigenbasis& target, const Eigen:
   check_count("source", source, options.to);
   check_count("target", target, options.to);
   check_samples(source, options);
-  const bool sampled = options.samples.size() > 0;
-  SampledFunctions from, to;
-  if (sampled) {
-    from = sampled_functions(source, options.samples, options.to);
-    to = {unit_functions(target, options.to), {}};
+  if (options.samples.size() > 0) {
+    RowMatrix<double> map = sampled_zoomout(
+        sampled_functions(source, options.samples, options.to),
+        {unit_functions(target, options.to), {}},
+        functional_map(source, target, initial, options.from, options.from), options.to,
+        options.step, {}, progress.stage("refining the map on samples", 0.0, 0.8));
+    Eigen::VectorXi all =
+        point_map(source, target, map, progress.stage("mapping every vertex", 0.8, 1.0));
+    return {std::move(all), std::move(map)};
   }
   const int rounds = 1 + (options.to - options.from + options.step - 1) / options.step;
   Zoomout result{initial, {}};
-  Eigen::VectorXi at_samples;
   for (int round = 0; round < rounds; ++round) {
     const int count = std::min(options.from + round * options.step, options.to);
     const ProgressRange part = progress.stage(
         "refining the map with " + std::to_string(count) + " functions",
         static_cast<double>(round) / rounds, static_cast<double>(round + 1) / rounds);
-    part.report(0.0);
-    result.functional_map = sampled && round > 0
-                                ? sampled_functional_map(from, to, at_samples, count)
-                                : functional_map(source, target, result.point_map, count, count);
-    if (sampled && count < options.to) {
-      at_samples = sampled_point_map(from, to, result.functional_map);
-    } else {
-      result.point_map = point_map(source, target, result.functional_map, part);
-    }
+    result.functional_map = functional_map(source, target, result.point_map, count, count);
+    result.point_map = point_map(source, target, result.functional_map, part);
   }
   return result;
 }

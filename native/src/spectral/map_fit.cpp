@@ -117,8 +117,11 @@ RowMatrix<double> sampled_functional_map(const SampledFunctions& source,
 
 RowMatrix<double> sampled_zoomout(const SampledFunctions& source, const SampledFunctions& target,
                                   RowMatrix<double> map, Eigen::Index to, Eigen::Index step,
-                                  const std::vector<std::pair<int, int>>& fixed) {
-  for (Eigen::Index count = std::min(map.rows(), map.cols()); count < to;) {
+                                  const std::vector<std::pair<int, int>>& fixed,
+                                  const ProgressRange& progress) {
+  const Eigen::Index from = std::min(map.rows(), map.cols());
+  for (Eigen::Index count = from; count < to;) {
+    progress.report(static_cast<double>(count - from) / static_cast<double>(to - from));
     count = std::min(count + step, to);
     Eigen::VectorXi rows = sampled_point_map(source, target, map);
     for (const auto& [from, at] : fixed) {

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "supple/core/progress.h"
 #include "supple/core/types.h"
 #include "supple/spectral/eigenbasis.h"
 
@@ -57,8 +58,10 @@ RowMatrix<double> sampled_functional_map(const SampledFunctions& source,
 /// ZoomOut on the samples: from C to one of `to` functions, `step` more a round.
 /// Source: Melzi et al. 2019, section 4.5.
 /// fixed: source and target rows that correspond; they stay so in every round.
+/// Errors: `cancelled`.
 RowMatrix<double> sampled_zoomout(const SampledFunctions& source, const SampledFunctions& target,
                                   RowMatrix<double> map, Eigen::Index to, Eigen::Index step,
-                                  const std::vector<std::pair<int, int>>& fixed = {});
+                                  const std::vector<std::pair<int, int>>& fixed = {},
+                                  const ProgressRange& progress = {});
 
 }  // namespace supple
