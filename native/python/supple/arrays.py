@@ -2,7 +2,7 @@
 """Checked conversion of what callers pass to the arrays the native module takes."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from .errors import SuppleError
 
@@ -17,12 +17,12 @@ def _array(value: ArrayLike, name: str) -> NDArray:
     return array
 
 
-def points(value: ArrayLike, name: str = "vertices") -> NDArray[np.float64]:
-    """(n, 3) float64, C order. Errors: wrong_shape."""
+def points(value: ArrayLike, name: str = "vertices", dtype: DTypeLike = np.float64) -> NDArray:
+    """(n, 3), float64 where not told, C order. Errors: wrong_shape."""
     array = _array(value, name)
     if array.ndim != 2 or array.shape[1] != 3:
         raise SuppleError("wrong_shape", f"{name} has shape {array.shape}; it must be (n, 3).")
-    return np.ascontiguousarray(array, dtype=np.float64)
+    return np.ascontiguousarray(array, dtype=dtype)
 
 
 def rows(value: ArrayLike, name: str) -> NDArray[np.float64]:
