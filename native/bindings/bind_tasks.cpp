@@ -29,6 +29,11 @@ EditOptions edit_options(const std::string& method, double stiffness, int rounds
   return options;
 }
 
+std::shared_ptr<const StartPose> start_pose(const Editor& editor,
+                                            const std::optional<Points>& vertices) {
+  return vertices ? std::make_shared<StartPose>(editor.prepared(), *vertices) : nullptr;
+}
+
 std::pair<Points, EditReport> pair_of(EditResult result) {
   return {std::move(result.vertices), result.report};
 }
@@ -166,18 +171,25 @@ void bind_tasks(py::module_& module) {
       .def(
           "solve",
           [](const Editor& editor, const std::vector<HandleTarget>& targets,
-             const EditOptions& options, Progress* progress) {
-            return pair_of(
-                editor.solve(targets, options, range(progress).stage("solving", 0.0, 1.0)));
+             const EditOptions& options, Progress* progress, const std::optional<Points>& start) {
+            return pair_of(editor.solve(targets, options,
+                                        range(progress).stage("solving", 0.0, 1.0),
+                                        start_pose(editor, start)));
           },
-          py::arg("targets"), py::arg("options"), py::arg("progress") = nullptr, NoGil());
+          py::arg("targets"), py::arg("options"), py::arg("progress") = nullptr,
+          py::arg("start") = py::none(), NoGil());
 
   py::class_<EditSession>(module, "EditSession")
       .def(py::init([](std::shared_ptr<Editor> editor, const EditOptions& options) {
              return std::make_unique<EditSession>(std::move(editor), options);
            }),
            py::arg("editor"), py::arg("options"))
-      .def("aim", &EditSession::aim, py::arg("targets"), NoGil())
+      .def(
+          "aim",
+          [](EditSession& session, const std::vector<HandleTarget>& targets) {
+            session.aim(targets);
+          },
+          py::arg("targets"), NoGil())
       .def(
           "advance",
           [](EditSession& session, double milliseconds) {

@@ -26,7 +26,10 @@ void bind_cache(py::module_& module);
 void bind_tasks(py::module_& module);
 void bind_map_metrics(py::module_& module);
 void bind_initial_maps(py::module_& module);
+void bind_inbetween(py::module_& module);
 void bind_refine(py::module_& module);
 void bind_transfer(py::module_& module);
+void bind_sequence(py::module_& module);
+void bind_point_cache(py::module_& module);
 
 }  // namespace supple::bindings

@@ -10,8 +10,11 @@ PYBIND11_MODULE(_native, module) {
   supple::bindings::bind_learning(module);
   supple::bindings::bind_cache(module);
   supple::bindings::bind_tasks(module);
+  supple::bindings::bind_inbetween(module);
   supple::bindings::bind_map_metrics(module);
   supple::bindings::bind_initial_maps(module);
   supple::bindings::bind_refine(module);
   supple::bindings::bind_transfer(module);
+  supple::bindings::bind_sequence(module);
+  supple::bindings::bind_point_cache(module);
 }

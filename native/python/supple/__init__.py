@@ -14,6 +14,7 @@ from .blending import blend, falloff_weights, farthest_points
 from .deforming import deform
 from .editing import Editor, EditResult, EditSession, Handle, edit
 from .errors import Cancelled, SuppleError
+from .inbetween import Inbetween
 from .initial_maps import (
     InitialMap,
     MapScore,
@@ -37,8 +38,11 @@ from .map_metrics import (
 from .mesh import Mesh, Note, PreparedMesh
 from .metrics import face_distortion, flipped_faces, pose_error, symmetric_dirichlet
 from .model import Model, load_model, shipped_models
+from .motion_handles import propose_motion_handles
 from .parallel import set_thread_count, thread_count
+from .point_cache import KeptFrames, PointCacheReader, PointCacheWriter
 from .refining import Refiner, RefineResult, refine
+from .sequence import SequenceEditor, SequenceFrame, handle_frames, part_of_motion, range_share
 from .transfer import (
     SurfaceMap,
     closest_points,
@@ -61,16 +65,22 @@ __all__ = [
     "Editor",
     "Geodesics",
     "Handle",
+    "Inbetween",
     "InitialMap",
+    "KeptFrames",
     "MapScore",
     "Mesh",
     "Model",
     "Note",
+    "PointCacheReader",
+    "PointCacheWriter",
     "PreparedCache",
     "PreparedMesh",
     "Progress",
     "RefineResult",
     "Refiner",
+    "SequenceEditor",
+    "SequenceFrame",
     "SuppleError",
     "SurfaceMap",
     "TrainResult",
@@ -90,13 +100,17 @@ __all__ = [
     "farthest_points",
     "flipped_faces",
     "geodesic_errors",
+    "handle_frames",
     "landmark_map",
     "load_map",
     "load_model",
     "map_dirichlet",
     "map_score",
     "nearest_map",
+    "part_of_motion",
     "pose_error",
+    "range_share",
+    "propose_motion_handles",
     "refine",
     "reversed_map",
     "save_map",

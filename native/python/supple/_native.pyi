@@ -25,15 +25,20 @@ __all__: list[str] = [
     "Handle",
     "HandleTarget",
     "InitialMap",
+    "KeptFrames",
     "MapScore",
     "Network",
     "Note",
+    "PointCacheReader",
+    "PointCacheWriter",
     "PreparedMesh",
     "Progress",
     "RefineOptions",
     "RefineReport",
     "RefineResult",
     "Refiner",
+    "SequenceEditor",
+    "SequenceFrame",
     "SparseCholesky",
     "SurfaceMap",
     "TrainOptions",
@@ -59,6 +64,7 @@ __all__: list[str] = [
     "functional_map",
     "geodesic_errors",
     "gradient",
+    "handle_frames",
     "jacobians",
     "landmark_map",
     "load_map",
@@ -71,7 +77,9 @@ __all__: list[str] = [
     "network_forward",
     "network_gradient",
     "point_map",
+    "part_of_motion",
     "pose_error",
+    "range_share",
     "reversed_map",
     "save_map",
     "set_thread_count",
@@ -153,6 +161,21 @@ class SurfaceMap:
     @property
     def weights(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
 
+class Inbetween:
+    def __init__(
+        self,
+        prepared: PreparedMesh,
+        poses: collections.abc.Sequence[
+            typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]
+        ],
+        times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
+        smooth: bool = True,
+        progress: Progress = None,
+    ) -> None: ...
+    def at(
+        self, time: typing.SupportsFloat | typing.SupportsIndex
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+
 class Geodesics:
     def __init__(
         self,
@@ -183,7 +206,19 @@ class InitialMap:
     @property
     def notes(self) -> list[Note]: ...
     @property
-    def point_map(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
+    def part_of_motion(
+    matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"],
+    centre: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[1, 3]"],
+    part: typing.SupportsFloat | typing.SupportsIndex,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]: ...
+def range_share(
+    frame: typing.SupportsFloat | typing.SupportsIndex,
+    first: typing.SupportsFloat | typing.SupportsIndex,
+    last: typing.SupportsFloat | typing.SupportsIndex,
+    ease_in: typing.SupportsFloat | typing.SupportsIndex,
+    ease_out: typing.SupportsFloat | typing.SupportsIndex,
+) -> float: ...
+def point_map(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
     @property
     def score(self) -> MapScore: ...
 
@@ -433,6 +468,7 @@ class Editor:
         targets: collections.abc.Sequence[HandleTarget],
         options: EditOptions,
         progress: Progress = None,
+        start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"] | None = None,
     ) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"], EditReport]: ...
 
 class EditSession:
@@ -443,6 +479,24 @@ class EditSession:
     def aim(self, targets: collections.abc.Sequence[HandleTarget]) -> None: ...
     @property
     def settled(self) -> bool: ...
+
+class SequenceFrame:
+    def __init__(
+        self,
+        vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+        corrections: collections.abc.Sequence[
+            typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] | None
+        ],
+        share: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+
+class SequenceEditor:
+    def __init__(self, editor: Editor, options: EditOptions) -> None: ...
+    def solve(
+        self,
+        frames: collections.abc.Sequence[SequenceFrame],
+        progress: Progress = None,
+    ) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]]: ...
 
 def blas_name() -> str: ...
 def blend(
@@ -527,6 +581,13 @@ def gradient(
     vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
     faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
 ) -> scipy.sparse.csc_matrix: ...
+def handle_frames(
+    prepared: PreparedMesh,
+    handles: collections.abc.Sequence[
+        typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"]
+    ],
+    vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]]: ...
 def jacobians(
     rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
     faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"],
@@ -577,6 +638,12 @@ def pose_error(
     posed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
     truth: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
 ) -> float: ...
+def propose_motion_handles(
+    prepared: PreparedMesh,
+    moved: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    count: typing.SupportsInt | typing.SupportsIndex,
+    radius: typing.SupportsFloat | typing.SupportsIndex | None,
+) -> list[typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]]: ...
 def reversed_map(
     map: SurfaceMap,
     from_vertices: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
@@ -835,3 +902,44 @@ class Refiner:
     def refine(self, map: SurfaceMap, progress: Progress | None = None) -> RefineResult: ...
     @property
     def notes(self) -> list[Note]: ...
+
+class PointCacheReader:
+    def __init__(self, path: os.PathLike | str | bytes) -> None: ...
+    @property
+    def points(self) -> int: ...
+    @property
+    def start(self) -> float: ...
+    @property
+    def rate(self) -> float: ...
+    @property
+    def frames(self) -> int: ...
+    def read(
+        self, frame: typing.SupportsInt | typing.SupportsIndex
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]"]: ...
+
+class PointCacheWriter:
+    def __init__(
+        self,
+        path: os.PathLike | str | bytes,
+        points: typing.SupportsInt | typing.SupportsIndex,
+        start: typing.SupportsFloat | typing.SupportsIndex,
+        rate: typing.SupportsFloat | typing.SupportsIndex,
+        frame_count: typing.SupportsInt | typing.SupportsIndex,
+    ) -> None: ...
+    @property
+    def frames(self) -> int: ...
+    def append(
+        self,
+        key: str,
+        positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float32, "[m, 3]"],
+    ) -> None: ...
+    def finish(self) -> None: ...
+    def close(self) -> None: ...
+    def discard(self) -> None: ...
+
+class KeptFrames:
+    def __init__(self, paths: collections.abc.Sequence[os.PathLike | str | bytes]) -> None: ...
+    def find(
+        self, key: str
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]"] | None: ...
+    def size(self) -> int: ...

@@ -138,6 +138,7 @@ class Editor:
         network: bool = True,
         loose_pieces: str = "follow",
         keep_volume: bool = True,
+        start: ArrayLike | None = None,
         progress: _native.Progress | None = None,
     ) -> EditResult:
         """Pose the mesh; the same result every time. The native work runs without the GIL.
@@ -156,13 +157,15 @@ class Editor:
             loose_pieces: "follow" or "stay": what components without a handle do.
             keep_volume: whether closed components whose handles keep their size get back most of
                 the volume that the edit has lost; not of "arap".
+            start: (n, 3) a pose of the mesh to edit in place of the rest shape, as a frame of an
+                animation; held handles stay and matrices act where it has them. See SequenceEditor.
             progress: a Progress to watch and cancel.
 
         Raises:
             SuppleError: wrong_shape, not_finite, singular_matrix, bad_option.
             Cancelled: if progress was cancelled.
         """
-        options = _options(
+        options = options_of(
             mode,
             stiffness,
             method,
@@ -175,7 +178,8 @@ class Editor:
             keep_volume,
         )
         targets = self._targets(self.handles if handles is None else handles)
-        vertices, report = self._native.solve(targets, options, progress)
+        pose = None if start is None else arrays.points(start, "start")
+        vertices, report = self._native.solve(targets, options, progress, pose)
         return _result(self.prepared, vertices, report)
 
     def session(
@@ -189,7 +193,7 @@ class Editor:
         keep_volume: bool = True,
     ) -> "EditSession":
         """An edit that goes on while its targets change; the arguments are those of `solve`."""
-        options = _options(
+        options = options_of(
             mode, stiffness, method, None, None, None, None, network, loose_pieces, keep_volume
         )
         return EditSession(self, _native.EditSession(self._native, options))
@@ -247,7 +251,7 @@ class EditSession:
 _MODES = {"natural": ("supple", 0.0), "stiff": ("supple", 1.0), "arap": ("arap", 1.0)}
 
 
-def _options(
+def options_of(
     mode: str | None,
     stiffness: float | None,
     method: str | None,
@@ -259,6 +263,7 @@ def _options(
     loose_pieces: str,
     keep_volume: bool,
 ) -> _native.EditOptions:
+    """What Editor.solve takes, checked."""
     if mode is not None and mode not in _MODES:
         raise SuppleError("bad_option", f"'{mode}' is no mode. Use 'natural', 'stiff' or 'arap'.")
     if mode is not None and (stiffness is not None or method is not None):

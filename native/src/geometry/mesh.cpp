@@ -205,17 +205,18 @@ Points TriangleMesh::from_surface(const Points& points) const {
   return (points * scale_).rowwise() + centre_;
 }
 
-Points TriangleMesh::scatter(const Points& moved, const MatrixField& vertex_jacobians) const {
+Points TriangleMesh::scatter(const Points& before, const Points& moved,
+                             const MatrixField& vertex_jacobians) const {
   Points result(vertices_.rows(), 3);
   for (Eigen::Index i = 0; i < mesh_vertex_.size(); ++i) {
     result.row(mesh_vertex_[i]) = moved.row(i) * scale_ + centre_;
   }
   for (Eigen::Index i = 0; i < unattached_.size(); ++i) {
     const int anchor = anchor_[i];
-    const Eigen::RowVector3d rest =
-        (vertices_.row(unattached_[i]) - centre_) / scale_ - surface_vertices_.row(anchor);
+    const Eigen::RowVector3d away =
+        (before.row(unattached_[i]) - before.row(mesh_vertex_[anchor])) / scale_;
     result.row(unattached_[i]) =
-        (moved.row(anchor) + rest * matrix_at(vertex_jacobians, anchor)) * scale_ + centre_;
+        (moved.row(anchor) + away * matrix_at(vertex_jacobians, anchor)) * scale_ + centre_;
   }
   return result;
 }

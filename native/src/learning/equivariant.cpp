@@ -302,7 +302,7 @@ Face<Scalar> face_at(const NetworkContext<Scalar>& context, const Fields<Scalar>
   face.whole_lead = lead.template cast<Scalar>();
   face.lead = (lead - fields.reference).template cast<Scalar>();
   face.first = (matrix_at(fields.signal->fields.front(), f) - lead).template cast<Scalar>();
-  face.normal = context.operators->face_normals.row(f).template cast<Scalar>();
+  face.normal = fields.look->face_normals->row(f).template cast<Scalar>();
   return face;
 }
 
@@ -330,6 +330,7 @@ Fields<Scalar> project_fields(const NetworkContext<Scalar>& context, const Signa
   const auto count = static_cast<Eigen::Index>(signal.fields.size());
   Fields<Scalar> result;
   result.signal = &signal;
+  result.look = &context.rest;
   const Eigen::Matrix<double, 1, 9> sum = operators.face_areas.transpose() * signal.fields.back();
   result.reference = Eigen::Map<const Matrix3>(sum.data()) / operators.face_areas.sum();
   const auto reference = Eigen::Map<const Eigen::Matrix<double, 1, 9>>(result.reference.data());
@@ -386,9 +387,9 @@ RowMatrix<Scalar> invariants(const NetworkContext<Scalar>& context, const Fields
               reference + matrix_of(smooth[static_cast<size_t>(s)].row(p).data() + kPadded * i);
         }
       }
-      const Row3<Scalar> normal = operators.vertex_normals.row(v).template cast<Scalar>();
+      const Row3<Scalar> normal = fields.look->vertex_normals->row(v).template cast<Scalar>();
       point_invariants(matrices, normal, result.row(p).data());
-      result.row(p).tail(2 * kScaleCount) = context.shape.row(p);
+      result.row(p).tail(2 * kScaleCount) = fields.look->shape.row(p);
     }
   }
   return result;
@@ -420,7 +421,7 @@ MatrixField correct_faces(const NetworkContext<Scalar>& context, const Fields<Sc
   FaceTask<Scalar> task{operators.faces.data(),
                         fields.signal->fields.back().data(),
                         fields.signal->fields.front().data(),
-                        operators.face_normals.data(),
+                        fields.look->face_normals->data(),
                         {},
                         at_vertices.data(),
                         result.data()};

@@ -37,9 +37,10 @@ using Row3 = Eigen::Matrix<Scalar, 1, 3>;
 /// of C.
 template <class Scalar>
 struct Fields {
-  const Signal* signal;            ///< not owned
-  Matrix3 reference;               ///< the mean of the last field by area; turns as the fields do
-  RowMatrix<Scalar> coefficients;  ///< k x 16 a field: 9 numbers of (X_i - C), the rest 0
+  const Signal* signal;             ///< not owned
+  const SurfaceLook<Scalar>* look;  ///< not owned; the rest shape's as `project_fields` leaves it
+  Matrix3 reference;                ///< the mean of the last field by area; turns as the fields do
+  RowMatrix<Scalar> coefficients;   ///< k x 16 a field: 9 numbers of (X_i - C), the rest 0
 };
 
 /// Averages the signal's fields to vertices and projects them to the context's eigenfunctions.

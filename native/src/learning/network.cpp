@@ -93,17 +93,50 @@ void NetworkContext<Scalar>::complete(const Eigenbasis& basis) {
   const SurfaceOperators& surface = *operators;
   const Eigen::Index k = domain.functions.cols();
   functions = basis.functions.leftCols(k).template cast<Scalar>();
-  shape.resize(samples.size(), 2 * kScaleCount);
   for (int s = 0; s < kScaleCount; ++s) {
     const Eigen::Index count = std::min(k, basis.stable_count(equivariant::scale_limit(s)));
     scales.push_back(s + 1 == kScaleCount ? k : count);
-    const Points smooth = basis.project(surface.vertices, scales.back());
-    for (Eigen::Index p = 0; p < samples.size(); ++p) {
-      const Eigen::RowVector3d away = surface.vertices.row(samples[p]) - smooth.row(samples[p]);
-      shape(p, 2 * s) = static_cast<Scalar>(away.dot(surface.vertex_normals.row(samples[p])));
-      shape(p, 2 * s + 1) = static_cast<Scalar>(away.norm());
+  }
+  rest = look(surface.vertices, surface.face_normals, surface.vertex_normals);
+}
+
+template <class Scalar>
+SurfaceLook<Scalar> NetworkContext<Scalar>::look(const Points& moved, const Points& face_normals,
+                                                 const Points& vertex_normals) const {
+  SurfaceLook<Scalar> result{&face_normals, &vertex_normals,
+                             RowMatrix<Scalar>(samples.size(), 2 * kScaleCount)};
+  // Phi^T M x. Rows of equal count are summed together, whatever the number of threads.
+  constexpr Eigen::Index kRows = 2048;
+  const Eigen::Index n = moved.rows(), k = functions.cols(), chunks = (n + kRows - 1) / kRows;
+  std::vector<RowMatrix<double>> parts(static_cast<size_t>(chunks));
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index i = 0; i < chunks; ++i) {
+    const Eigen::Index first = i * kRows, rows = std::min(kRows, n - first);
+    const Points weighted =
+        operators->mass.segment(first, rows).asDiagonal() * moved.middleRows(first, rows);
+    parts[static_cast<size_t>(i)] =
+        functions.middleRows(first, rows).template cast<double>().transpose() * weighted;
+  }
+  RowMatrix<double> coefficients = RowMatrix<double>::Zero(k, 3);
+  for (const RowMatrix<double>& part : parts) {
+    coefficients += part;
+  }
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index p = 0; p < samples.size(); ++p) {
+    Eigen::RowVector3d away = moved.row(samples[p]);
+    Eigen::Index done = 0;
+    for (int s = 0; s < kScaleCount; ++s) {
+      const Eigen::Index width = scales[static_cast<size_t>(s)] - done;
+      if (width > 0) {
+        away -= domain.functions.row(p).segment(done, width).template cast<double>() *
+                coefficients.middleRows(done, width);
+        done += width;
+      }
+      result.shape(p, 2 * s) = static_cast<Scalar>(away.dot(vertex_normals.row(samples[p])));
+      result.shape(p, 2 * s + 1) = static_cast<Scalar>(away.norm());
     }
   }
+  return result;
 }
 
 template <class Scalar>
@@ -167,7 +200,8 @@ RowMatrix<Scalar> LocalJacobianNetwork<Scalar>::raw_inputs(const NetworkContext<
 
 template <class Scalar>
 MatrixField LocalJacobianNetwork<Scalar>::forward(const NetworkContext<Scalar>& context,
-                                                  const Signal& signal, Trace* trace) const {
+                                                  const Signal& signal, Trace* trace,
+                                                  const SurfaceLook<Scalar>* look) const {
   const auto layers = [&](RowMatrix<Scalar> input) {
     input.rowwise() -= mean_;
     input.array().rowwise() *= scale_.array();
@@ -182,7 +216,8 @@ MatrixField LocalJacobianNetwork<Scalar>::forward(const NetworkContext<Scalar>& 
     }
     return average_vertices_to_faces(context.operators->faces, output).template cast<double>();
   }
-  const auto fields = equivariant::project_fields(context, signal);
+  auto fields = equivariant::project_fields(context, signal);
+  fields.look = look == nullptr ? &context.rest : look;
   const RowMatrix<Scalar> output = layers(equivariant::invariants(context, fields));
   return equivariant::correct_faces(context, fields, product(context.domain.projector, output));
 }

@@ -134,7 +134,7 @@ TEST(NetworkContext, EndsItsScalesWholeAndAscending) {
 
 TEST(NetworkContext, ShapeIsTheDistanceToTheSmoothedSurface) {
   const test::RestMesh<double> rest(zoo::perturbed_sphere(2, 3), 100, 0);
-  const auto& shape = rest.context.shape;
+  const auto& shape = rest.context.rest.shape;
   ASSERT_EQ(shape.cols(), 10);
   for (Eigen::Index p = 0; p < shape.rows(); ++p) {
     for (int s = 0; s < 5; ++s) {

@@ -71,7 +71,7 @@ TEST(EnclosedVolume, RestoresMostOfWhatIsLostAndMovesNothingThatIsHeld) {
   Points squeezed = operators.vertices;
   squeezed.col(0) *= 0.97;
   Points moved = squeezed;
-  volume.restore(poisson, Eigen::VectorXi::Ones(1), moved);
+  volume.restore(poisson, volume.at_rest(), moved);
   const double lost = volume.at_rest()[0] - volume_of(squeezed, operators.faces);
   EXPECT_NEAR(volume_of(moved, operators.faces), volume_of(squeezed, operators.faces) + 0.7 * lost,
               1e-9);
@@ -79,7 +79,7 @@ TEST(EnclosedVolume, RestoresMostOfWhatIsLostAndMovesNothingThatIsHeld) {
     EXPECT_EQ(moved.row(v), squeezed.row(v));
   }
   moved = squeezed;
-  volume.restore(poisson, Eigen::VectorXi::Zero(1), moved);
+  volume.restore(poisson, Eigen::VectorXd::Zero(1), moved);
   EXPECT_EQ(moved, squeezed);
 }
 
@@ -87,7 +87,7 @@ TEST(EnclosedVolume, OfTheStiffEnergyHasAGradient) {
   const SurfaceOperators operators =
       operators_of(zoo::joined(zoo::perturbed_sphere(1, 3), zoo::disc(3, 8)));
   const EnclosedVolume volume(operators);
-  const StiffEnergy with(operators, &volume, Eigen::VectorXi::Ones(2)), without(operators);
+  const StiffEnergy with(operators, &volume, volume.at_rest()), without(operators);
   Points moved = test::bent(operators.vertices), gradient, other;
   moved.col(1) *= 0.8;
   EXPECT_GT(with.evaluate(moved, gradient), without.evaluate(moved, other) + 0.005);

@@ -59,8 +59,14 @@ class TriangleMesh {
   Points from_surface(const Points& points) const;
 
   /// ns x 3 moved surface vertices and ns x 9 vertex Jacobians (V' = V J, rows) to n x 3 vertices
-  /// in the caller's units. An unattached vertex moves with its nearest surface vertex.
-  Points scatter(const Points& moved, const MatrixField& vertex_jacobians) const;
+  /// in the caller's units. An unattached vertex moves with the surface vertex that is nearest to
+  /// it at rest. before: n x 3, caller's units, where the Jacobians are taken from; the rest
+  /// vertices if not given.
+  Points scatter(const Points& moved, const MatrixField& vertex_jacobians) const {
+    return scatter(vertices_, moved, vertex_jacobians);
+  }
+  Points scatter(const Points& before, const Points& moved,
+                 const MatrixField& vertex_jacobians) const;
 
  private:
   void find_surface();

@@ -56,6 +56,14 @@ struct Architecture {
   bool operator==(const Architecture&) const = default;
 };
 
+/// What a network sees of where a surface lies: at rest, or in a pose that edits start from.
+template <class Scalar>
+struct SurfaceLook {
+  const Points* face_normals = nullptr;    ///< m x 3; not owned
+  const Points* vertex_normals = nullptr;  ///< n x 3; not owned
+  RowMatrix<Scalar> shape;                 ///< p x 2 scales: distance to the smoothed surface
+};
+
 /// What a network needs to know of a rest mesh besides its operators: built once a mesh.
 template <class Scalar>
 struct NetworkContext {
@@ -74,7 +82,12 @@ struct NetworkContext {
   SpectralDomain<Scalar> domain;                ///< the eigenfunctions at the samples
   RowMatrix<Scalar> functions;                  ///< n x k at every vertex
   std::vector<Eigen::Index> scales;  ///< ascending counts of eigenfunctions, the last is k
-  RowMatrix<Scalar> shape;           ///< p x 2 scales: distance to the smoothed surface
+  SurfaceLook<Scalar> rest;
+
+  /// The look of the surface with its vertices moved (n x 3, surface units); the normals are kept,
+  /// not owned.
+  SurfaceLook<Scalar> look(const Points& moved, const Points& face_normals,
+                           const Points& vertex_normals) const;
 
  private:
   void complete(const Eigenbasis& basis);  // all that follows from samples and domain
@@ -105,9 +118,10 @@ class LocalJacobianNetwork {
   struct Trace {
     SpectralMlpTrace<Scalar> mlp;
   };
-  /// m x 9 Jacobians of a signal.
+  /// m x 9 Jacobians of a signal. look: nullptr for that at rest; else that of the pose which the
+  /// signal starts from.
   MatrixField forward(const NetworkContext<Scalar>& context, const Signal& signal,
-                      Trace* trace = nullptr) const;
+                      Trace* trace = nullptr, const SurfaceLook<Scalar>* look = nullptr) const;
   /// Adds to `gradient` from the m x 9 gradient with respect to `forward`.
   void backward(const NetworkContext<Scalar>& context, const Signal& signal, const Trace& trace,
                 const MatrixField& grad, LayerParameters<Scalar>& gradient) const;

@@ -13,6 +13,7 @@
 #include "supple/geometry/pinned_laplacian.h"
 #include "supple/learning/network.h"
 #include "supple/tasks/prepared_mesh.h"
+#include "supple/tasks/start_pose.h"
 
 namespace supple {
 
@@ -27,7 +28,8 @@ struct Handle {
 
 /// Where a handle's vertices are to be, in the caller's units. Neither set: held where they are.
 struct HandleTarget {
-  std::optional<Eigen::Matrix4d> matrix;  ///< for column vectors, on rest positions; invertible
+  std::optional<Eigen::Matrix4d> matrix;  ///< for column vectors, on positions at the start (rest,
+                                          ///< or a given pose); invertible
   std::optional<Points> positions;        ///< one row a vertex of the handle
 };
 
@@ -96,13 +98,16 @@ class Editor {
          std::shared_ptr<const LocalJacobianNetwork<float>> network, ProgressRange progress = {},
          const Editor* former = nullptr);
 
-  /// targets: one a handle, in order. The same bytes for the same targets, options and number of
-  /// threads. Safe to call from several threads.
+  /// targets: one a handle, in order. start: the pose to edit; nullptr for the rest shape. The same
+  /// bytes for the same targets, options, start and number of threads. Safe to call from several
+  /// threads.
   /// Errors: `wrong_shape`, `not_finite`, `singular_matrix`, `bad_option`, `cancelled`.
   EditResult solve(const std::vector<HandleTarget>& targets, const EditOptions& options = {},
-                   ProgressRange progress = {}) const;
+                   ProgressRange progress = {},
+                   std::shared_ptr<const StartPose> start = nullptr) const;
 
   const std::vector<Handle>& handles() const { return handles_; }
+  const PreparedMesh& prepared() const { return *prepared_; }
 
  private:
   friend class EditSession;
@@ -133,8 +138,10 @@ class EditSession {
   ~EditSession();
   EditSession(EditSession&&) noexcept;
 
-  /// New targets; what was done for the last ones is dropped. Errors: those of `Editor::solve`.
-  void aim(const std::vector<HandleTarget>& targets);
+  /// New targets, and the pose to edit (nullptr: the rest shape); what was done for the last ones
+  /// is dropped. Errors: those of `Editor::solve`.
+  void aim(const std::vector<HandleTarget>& targets,
+           std::shared_ptr<const StartPose> start = nullptr);
   /// Works until about this many milliseconds have passed, at least one step and to a usable pose,
   /// and returns it. Stopped at any time and called again, it ends where `Editor::solve` does.
   /// Errors: `bad_option` before the first `aim`.

@@ -9,6 +9,7 @@ import supple
 
 from .caching import show_cache
 from .editing import edit
+from .estimating import estimate
 from .evaluating import evaluate_refine
 from .refining import refine
 
@@ -21,6 +22,7 @@ app = typer.Typer(
 evaluate = typer.Typer(no_args_is_help=True, help="Measure on data with known answers.")
 app.add_typer(evaluate, name="evaluate")
 app.command()(edit)
+app.command()(estimate)
 app.command()(refine)
 app.command("cache")(show_cache)
 evaluate.command("refine")(evaluate_refine)

@@ -88,10 +88,10 @@ double ArapEnergy::evaluate(const Points& moved, Points& gradient) const {
 }
 
 StiffEnergy::StiffEnergy(const SurfaceOperators& operators, const EnclosedVolume* volume,
-                         Eigen::VectorXi counts)
+                         Eigen::VectorXd kept)
     : operators_(operators),
       volume_(volume),
-      counts_(std::move(counts)),
+      kept_(std::move(kept)),
       bending_(Eigen::VectorXd::Constant(operators.faces.rows(), kBending)),
       over_at_rest_(turned_over(operators.vertices)) {}
 
@@ -124,17 +124,17 @@ double StiffEnergy::evaluate(const Points& moved, Points& gradient) const {
   return volume_ == nullptr ? strain : strain + add_volume(moved, gradient);
 }
 
-// sum over components of k (V / rest - 1)^2, k in units of strain over the whole surface.
+// sum over components of k (V / kept - 1)^2, k in units of strain over the whole surface.
 double StiffEnergy::add_volume(const Points& moved, Points& gradient) const {
   const Points slope = volume_->gradient(moved);
-  const Eigen::VectorXd now = volume_->of(moved, slope), &rest = volume_->at_rest();
-  Eigen::VectorXd factor = Eigen::VectorXd::Zero(rest.size());
+  const Eigen::VectorXd now = volume_->of(moved, slope);
+  Eigen::VectorXd factor = Eigen::VectorXd::Zero(kept_.size());
   double value = 0.0;
-  for (Eigen::Index c = 0; c < rest.size(); ++c) {
-    if (counts_[c] != 0 && rest[c] > 0.0) {
-      const double change = now[c] / rest[c] - 1.0;
+  for (Eigen::Index c = 0; c < kept_.size(); ++c) {
+    if (kept_[c] > 0.0) {
+      const double change = now[c] / kept_[c] - 1.0;
       value += kVolume * change * change;
-      factor[c] = 2.0 * kVolume * change / rest[c];
+      factor[c] = 2.0 * kVolume * change / kept_[c];
     }
   }
 #pragma omp parallel for schedule(static)

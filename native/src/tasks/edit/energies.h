@@ -38,9 +38,10 @@ class ArapEnergy : public DeformationEnergy {
 /// membrane has the least strain where it gives way to a bend and buckles.
 class StiffEnergy : public DeformationEnergy {
  public:
-  /// volume: not owned; nullptr where none is kept. counts: a component, 0 where its is not.
+  /// volume: not owned; nullptr where none is kept. kept: a component, its volume before the edit;
+  /// 0 where it is not kept.
   explicit StiffEnergy(const SurfaceOperators& operators, const EnclosedVolume* volume = nullptr,
-                       Eigen::VectorXi counts = {});
+                       Eigen::VectorXd kept = {});
   double evaluate(const Points& moved, Points& gradient) const override;
   double stiffness() const override { return 8.0 + 2.0 * kBending; }
   /// Raises the weight of bending around every face that has turned over. Returns how many have.
@@ -54,7 +55,7 @@ class StiffEnergy : public DeformationEnergy {
 
   const SurfaceOperators& operators_;
   const EnclosedVolume* volume_;
-  Eigen::VectorXi counts_;
+  Eigen::VectorXd kept_;
   Eigen::VectorXd bending_;       // a face
   Eigen::VectorXi over_at_rest_;  // a face: 1 where it already is
 };

@@ -41,6 +41,17 @@ void jacobians_of(const SurfaceOperators& operators, const Points& moved, Eigen:
   }
 }
 
+// Sets `rotations` to the Q with the least |J - S Q|.
+void rotations_past(const MatrixField& stretch, Eigen::Index first, Eigen::Index count,
+                    Chunk& jacobians, double* rotations) {
+  Chunk turned;
+  for (Eigen::Index i = 0; i < count; ++i) {
+    matrix_of(turned, i).noalias() =
+        matrix_at(stretch, first + i).transpose() * matrix_of(jacobians, i);
+  }
+  closest_rotations(turned.data(), rotations, count, Precision::single);
+}
+
 // Sets rows of `away` to targets - jacobians. Rotations come in single precision; what differs no
 // more than their rounding counts as reached, so that a rigid motion stays one exactly.
 void difference(const Chunk& targets, const Chunk& jacobians, Eigen::Index first,
@@ -89,16 +100,31 @@ MatrixField rotations_of(const SurfaceOperators& operators, const Points& moved)
   return rotations;
 }
 
+MatrixField rotations_from(const SurfaceOperators& operators, const Points& moved,
+                           const MatrixField& start) {
+  MatrixField rotations(operators.faces.rows(), 9);
+  for_each_chunk(rotations.rows(), [&](Eigen::Index first, Eigen::Index count) {
+    Chunk j;
+    jacobians_of(operators, moved, first, count, j);
+    rotations_past(start, first, count, j, rotations.row(first).data());
+  });
+  return rotations;
+}
+
+void follow(const MatrixField& start, MatrixField& field) {
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index f = 0; f < field.rows(); ++f) {
+    matrix_at(field, f) = matrix_at(start, f) * Matrix3(matrix_at(field, f));
+  }
+}
+
 Points towards_stretched(const SurfaceOperators& operators, const Points& moved,
                          const MatrixField& stretch) {
   MatrixField away(stretch.rows(), 9);
   for_each_chunk(away.rows(), [&](Eigen::Index first, Eigen::Index count) {
     Chunk j, turned, q;
     jacobians_of(operators, moved, first, count, j);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      matrix_of(turned, i).noalias() = matrix_at(stretch, first + i).transpose() * matrix_of(j, i);
-    }
-    closest_rotations(turned.data(), q.data(), count, Precision::single);
+    rotations_past(stretch, first, count, j, q.data());
     for (Eigen::Index i = 0; i < count; ++i) {
       matrix_of(turned, i).noalias() = matrix_at(stretch, first + i) * matrix_of(q, i);
     }

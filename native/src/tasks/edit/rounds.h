@@ -16,6 +16,14 @@ Points towards_rotations(const SurfaceOperators& operators, const Points& moved)
 /// m x 9: Q, the closest rotations of the Jacobians of `moved`.
 MatrixField rotations_of(const SurfaceOperators& operators, const Points& moved);
 
+/// m x 9: the rotations Q that have the least |J - S Q|, from another pose than rest. start: m x 9,
+/// S, the Jacobians of that pose.
+MatrixField rotations_from(const SurfaceOperators& operators, const Points& moved,
+                           const MatrixField& start);
+
+/// Sets each matrix X of `field` to S X. start: m x 9, S.
+void follow(const MatrixField& start, MatrixField& field);
+
 /// T = S Q, with the rotation Q that has the least |J - S Q|. stretch: m x 9, S.
 Points towards_stretched(const SurfaceOperators& operators, const Points& moved,
                          const MatrixField& stretch);

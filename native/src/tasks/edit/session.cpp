@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <Eigen/LU>
 #include <chrono>
 #include <cmath>
 
@@ -51,6 +52,26 @@ bool rigid(const Eigen::Matrix4d& matrix) {
   return (linear - closest_rotation(linear)).norm() < 1e-3;
 }
 
+// Of the pose that an edit starts from, what energies ask: a face without an area there has no
+// strain, and weighs nothing.
+std::unique_ptr<const SurfaceOperators> operators_of(const SurfaceOperators& rest,
+                                                     const StartPose& start) {
+  auto result = std::make_unique<SurfaceOperators>(rest);
+  result->vertices = start.vertices;
+  result->face_normals = start.face_normals;
+  for (Eigen::Index f = 0; f < rest.faces.rows(); ++f) {
+    if (is_degenerate(start.vertices, rest.faces, f)) {
+      result->face_areas[f] = 0.0;
+      result->inverse_frames.row(f).setZero();
+    } else {
+      result->face_areas[f] *= matrix_at(start.jacobians, f).determinant();
+      matrix_at(result->inverse_frames, f) =
+          matrix_at(start.jacobians, f).inverse() * matrix_at(rest.inverse_frames, f);
+    }
+  }
+  return result;
+}
+
 Matrix3 row_rotation(const Eigen::Matrix4d& matrix) {
   return closest_rotation(Matrix3(matrix.topLeftCorner<3, 3>().transpose()));
 }
@@ -76,16 +97,24 @@ struct EditSession::State {
   int usable() const { return 1 + options.rounds + polish + (report.volume_kept ? 1 : 0); }
   int step_count() const { return usable() + passes; }
   bool settled() const { return next >= step_count(); }
-  void aim(const std::vector<HandleTarget>& targets);
+  /// Where the edit starts from, in surface units and in the caller's.
+  const Points& from() const { return start == nullptr ? operators().vertices : start->vertices; }
+  const Points& mesh_from() const {
+    return start == nullptr ? editor->prepared_->mesh.vertices() : start->mesh_vertices;
+  }
+  void aim(const std::vector<HandleTarget>& targets, std::shared_ptr<const StartPose> start_in);
   void step();
   EditResult result() const;
 
-  void find_guide_rotations(const Points& handles_rest,
+  void find_guide_rotations(const Points& handles_before,
                             const std::vector<std::optional<Matrix3>>& known);
   Points smooth_displacement() const;
   void suggest();
   /// Adds what the residual of the Poisson equation and the soft handles' pulls leave to be done.
   void correct(Points residual);
+  /// m x 9: what `points` make of the faces since the start: closest rotations.
+  MatrixField rotations_since_start(const Points& points) const;
+  Points towards_own_rotations() const;
   void round(bool use_network);
   void polish_pass();
   void pass();
@@ -96,14 +125,18 @@ struct EditSession::State {
   bool with_network = false, aimed = false;
   int polish = 0, passes = 0;
 
+  std::shared_ptr<const StartPose> start;            // nullptr: the rest shape
+  SurfaceLook<float> look;                           // of `start`, for the network
+  std::unique_ptr<const SurfaceOperators> of_start;  // for energies
+
   Points positions;     // of every handle vertex in handle order, caller's units
   Points held;          // of editor->held_, surface units
   Points soft_targets;  // those of them that are soft
   RigidMotion whole;
   std::vector<Matrix3> guide_rotations;
   Points moved;
-  MatrixField stretch;            // of the last round with the network
-  Eigen::VectorXi volume_counts;  // a component: 1 where its volume is kept
+  MatrixField stretch;           // of the last round with the network, times the start's Jacobians
+  Eigen::VectorXd kept_volumes;  // a component: its volume before the edit, 0 where it is not kept
   std::unique_ptr<DeformationEnergy> energy;
   std::unique_ptr<PulledEnergy> pulled;  // with the soft handles
   std::unique_ptr<Descent> descent;
@@ -117,13 +150,13 @@ struct EditSession::State {
 };
 
 Points EditSession::State::target_positions(const std::vector<HandleTarget>& targets) const {
-  const Points& rest = editor->prepared_->mesh.vertices();
+  const Points& before = mesh_from();
   Points result(editor->held_slot_.size(), 3);
   Eigen::Index row = 0;
   for (size_t h = 0; h < targets.size(); ++h) {
     const Eigen::VectorXi& vertices = editor->handles_[h].vertices;
     for (Eigen::Index i = 0; i < vertices.size(); ++i, ++row) {
-      const Eigen::RowVector3d point = rest.row(vertices[i]);
+      const Eigen::RowVector3d point = before.row(vertices[i]);
       if (targets[h].matrix) {
         result.row(row) = (targets[h].matrix->topLeftCorner<3, 3>() * point.transpose() +
                            targets[h].matrix->topRightCorner<3, 1>())
@@ -138,10 +171,16 @@ Points EditSession::State::target_positions(const std::vector<HandleTarget>& tar
   return result;
 }
 
-void EditSession::State::aim(const std::vector<HandleTarget>& targets) {
+void EditSession::State::aim(const std::vector<HandleTarget>& targets,
+                             std::shared_ptr<const StartPose> start_in) {
   check_targets(editor->handles_, targets);
   const Editor& e = *editor;
-  const Points& rest = operators().vertices;
+  start = std::move(start_in);
+  if (start != nullptr && with_network) {
+    look = e.context_->look(start->vertices, start->face_normals, start->vertex_normals);
+  }
+  of_start.reset();
+  const Points& before = from();
   positions = target_positions(targets);
   const Points on_surface = e.prepared_->mesh.to_surface(positions);
   held.resize(e.held_.size(), 3);
@@ -151,10 +190,10 @@ void EditSession::State::aim(const std::vector<HandleTarget>& targets) {
     }
   }
   soft_targets = held(e.soft_->places, Eigen::all);
-  Points handles_rest(e.handle_rows_, 3);
+  Points handles_before(e.handle_rows_, 3);
   Eigen::VectorXd weights(e.handle_rows_);
   for (Eigen::Index i = 0; i < e.handle_rows_; ++i) {
-    handles_rest.row(i) = rest.row(e.held_[i]);
+    handles_before.row(i) = before.row(e.held_[i]);
     weights[i] = e.handles_[static_cast<size_t>(e.held_handle_[i])].weight;
   }
   const Matrix3 identity = Matrix3::Identity();
@@ -166,13 +205,13 @@ void EditSession::State::aim(const std::vector<HandleTarget>& targets) {
       turns.push_back(e.handles_[h].weight * *known[h]);
     }
   }
-  whole = nearest_motion(handles_rest, held.topRows(e.handle_rows_), weights, turns);
+  whole = nearest_motion(handles_before, held.topRows(e.handle_rows_), weights, turns);
   // Loose pieces go with the whole in the solves, so that one rigid motion of all stays one.
   for (Eigen::Index i = e.handle_rows_; i < held.rows(); ++i) {
-    held.row(i) = whole(rest.row(e.held_[i]));
+    held.row(i) = whole(before.row(e.held_[i]));
   }
 
-  find_guide_rotations(handles_rest, known);
+  find_guide_rotations(handles_before, known);
   descent.reset();
   pulled.reset();
   energy.reset();
@@ -187,19 +226,18 @@ void EditSession::State::aim(const std::vector<HandleTarget>& targets) {
 
 void EditSession::State::find_kept_volumes(const std::vector<HandleTarget>& targets) {
   const Editor& e = *editor;
-  const Eigen::VectorXd& at_rest = e.volume_->at_rest();
-  volume_counts = (at_rest.array() > 0.0).cast<int>();
+  kept_volumes = start == nullptr ? e.volume_->at_rest() : e.volume_->in(start->vertices);
   for (Eigen::Index i = 0; i < e.handle_rows_; ++i) {
     const HandleTarget& target = targets[static_cast<size_t>(e.held_handle_[i])];
     if (target.matrix && !rigid(*target.matrix)) {
-      volume_counts[operators().component[e.held_[i]]] = 0;
+      kept_volumes[operators().component[e.held_[i]]] = 0.0;
     }
   }
   report.volume_kept = options.keep_volume && options.method == EditMethod::supple &&
-                       (volume_counts.array() != 0).any();
+                       (kept_volumes.array() > 0.0).any();
 }
 
-void EditSession::State::find_guide_rotations(const Points& handles_rest,
+void EditSession::State::find_guide_rotations(const Points& handles_before,
                                               const std::vector<std::optional<Matrix3>>& known) {
   const Editor& e = *editor;
   guide_rotations.assign(static_cast<size_t>(e.guides_.size()), whole.rotation);
@@ -216,7 +254,8 @@ void EditSession::State::find_guide_rotations(const Points& handles_rest,
       continue;
     }
     if (smooth.rows() == 0) {
-      smooth = operators().jacobians_of(smooth_displacement());
+      smooth = start == nullptr ? operators().jacobians_of(smooth_displacement())
+                                : rotations_since_start(smooth_displacement());
     }
     Eigen::Index first = guide, last = guide;  // the handle's rows are contiguous
     while (first > 0 && e.held_handle_[first - 1] == h) {
@@ -226,37 +265,40 @@ void EditSession::State::find_guide_rotations(const Points& handles_rest,
       ++last;
     }
     const Eigen::Matrix<double, 1, 9> around = vertex_average(operators(), smooth, e.held_[guide]);
-    rotation = rotation_around(handles_rest.middleRows(first, last - first),
-                               held.middleRows(first, last - first), handles_rest.row(guide),
+    rotation = rotation_around(handles_before.middleRows(first, last - first),
+                               held.middleRows(first, last - first), handles_before.row(guide),
                                closest_rotation(Eigen::Map<const Matrix3>(around.data())));
   }
 }
 
 // The rigid motion, and biharmonic interpolation of what the handles ask besides.
 Points EditSession::State::smooth_displacement() const {
-  const Points& rest = operators().vertices;
+  const Points& before = from();
   Points away(editor->guides_.size(), 3);
   for (Eigen::Index g = 0; g < away.rows(); ++g) {
     const int guide = editor->guides_[g];
-    away.row(g) = held.row(guide) - whole(rest.row(editor->held_[guide]));
+    away.row(g) = held.row(guide) - whole(before.row(editor->held_[guide]));
   }
   Points result = editor->interpolation_->solve(away);
 #pragma omp parallel for schedule(static)
   for (Eigen::Index v = 0; v < result.rows(); ++v) {
-    result.row(v) += whole(rest.row(v));
+    result.row(v) += whole(before.row(v));
   }
   return result;
 }
 
 // From the rigid motion, which needs no correction where the handles ask for nothing else.
 void EditSession::State::suggest() {
-  const Points& rest = operators().vertices;
-  const MatrixField rotations =
+  const Points& before = from();
+  MatrixField rotations =
       interpolated_rotations(operators(), *editor->interpolation_, guide_rotations, whole.rotation);
-  moved.resize(rest.rows(), 3);
+  if (start != nullptr) {
+    follow(start->jacobians, rotations);
+  }
+  moved.resize(before.rows(), 3);
 #pragma omp parallel for schedule(static)
   for (Eigen::Index v = 0; v < moved.rows(); ++v) {
-    moved.row(v) = whole(rest.row(v));
+    moved.row(v) = whole(before.row(v));
   }
   for (const int place : editor->firm_) {
     moved.row(editor->held_[place]) = held.row(place);
@@ -269,32 +311,51 @@ void EditSession::State::correct(Points residual) {
   moved += editor->poisson_->correction(residual);
 }
 
+MatrixField EditSession::State::rotations_since_start(const Points& points) const {
+  return start == nullptr ? rotations_of(operators(), points)
+                          : rotations_from(operators(), points, start->jacobians);
+}
+
+Points EditSession::State::towards_own_rotations() const {
+  return start == nullptr ? towards_rotations(operators(), moved)
+                          : towards_stretched(operators(), moved, start->jacobians);
+}
+
 void EditSession::State::round(bool use_network) {
   if (!use_network) {
-    correct(towards_rotations(operators(), moved));
+    correct(towards_own_rotations());
     return;
   }
   Signal signal;
-  signal.fields.push_back(rotations_of(operators(), moved));
-  MatrixField jacobians = editor->network_->forward(*editor->context_, signal);
+  signal.fields.push_back(rotations_since_start(moved));
+  MatrixField jacobians = editor->network_->forward(*editor->context_, signal, nullptr,
+                                                    start == nullptr ? nullptr : &look);
   // Towards the stiff end less of the network's stretch is kept.
   bound_stretch(1.0 - options.stiffness, kMostStretch, jacobians, stretch);
+  if (start != nullptr) {
+    follow(start->jacobians, jacobians);
+    follow(start->jacobians, stretch);
+  }
   correct(towards(operators(), moved, jacobians));
 }
 
 void EditSession::State::polish_pass() {
-  correct(stretch.rows() == 0 ? towards_rotations(operators(), moved)
+  correct(stretch.rows() == 0 ? towards_own_rotations()
                               : towards_stretched(operators(), moved, stretch));
 }
 
 void EditSession::State::pass() {
   const bool stiff = options.method == EditMethod::supple;
   if (descent == nullptr) {
+    if (start != nullptr) {
+      of_start = operators_of(operators(), *start);
+    }
+    const SurfaceOperators& before = start == nullptr ? operators() : *of_start;
     if (stiff) {
       energy = std::make_unique<StiffEnergy>(
-          operators(), report.volume_kept ? editor->volume_.get() : nullptr, volume_counts);
+          before, report.volume_kept ? editor->volume_.get() : nullptr, kept_volumes);
     } else {
-      energy = std::make_unique<ArapEnergy>(operators());
+      energy = std::make_unique<ArapEnergy>(before);
     }
     pulled = std::make_unique<PulledEnergy>(*energy, *editor->soft_, soft_targets);
     descent = std::make_unique<Descent>(*pulled, *editor->poisson_);
@@ -328,7 +389,7 @@ void EditSession::State::step() {
     ++report.polish;
     report.rounds_milliseconds += watch.milliseconds();
   } else if (next < usable()) {
-    editor->volume_->restore(*editor->poisson_, volume_counts, moved);
+    editor->volume_->restore(*editor->poisson_, kept_volumes, moved);
     report.rounds_milliseconds += watch.milliseconds();
   } else {
     pass();
@@ -340,7 +401,7 @@ void EditSession::State::step() {
 
 void EditSession::State::place_loose_pieces(Points& placed,
                                             const MatrixField& vertex_jacobians) const {
-  const Points& rest = operators().vertices;
+  const Points& before = from();
   const Eigen::VectorXi& anchor = editor->anchor_;
   std::vector<Matrix3> turn(static_cast<size_t>(anchor.size()), Matrix3::Identity());
   if (options.loose_pieces == LoosePieces::follow) {
@@ -356,8 +417,8 @@ void EditSession::State::place_loose_pieces(Points& placed,
       continue;
     }
     placed.row(v) = options.loose_pieces == LoosePieces::stay
-                        ? Eigen::RowVector3d(rest.row(v))
-                        : placed.row(anchor[piece]) + (rest.row(v) - rest.row(anchor[piece])) *
+                        ? Eigen::RowVector3d(before.row(v))
+                        : placed.row(anchor[piece]) + (before.row(v) - before.row(anchor[piece])) *
                                                           turn[static_cast<size_t>(piece)];
   }
 }
@@ -369,10 +430,11 @@ EditResult EditSession::State::result() const {
   Points placed = moved;
   MatrixField vertex_jacobians(0, 9);
   if ((editor->anchor_.array() >= 0).any() || mesh.vertices().rows() != moved.rows()) {
-    vertex_jacobians = operators().average * operators().jacobians_of(moved);
+    vertex_jacobians = operators().average * (start == nullptr ? operators().jacobians_of(moved)
+                                                               : rotations_since_start(moved));
     place_loose_pieces(placed, vertex_jacobians);
   }
-  result.vertices = mesh.scatter(placed, vertex_jacobians);
+  result.vertices = mesh.scatter(mesh_from(), placed, vertex_jacobians);
   Eigen::Index row = 0;
   for (const Handle& handle : editor->handles_) {
     for (const int vertex : handle.vertices) {
@@ -392,7 +454,10 @@ EditSession::EditSession(std::shared_ptr<const Editor> editor, const EditOptions
 EditSession::~EditSession() = default;
 EditSession::EditSession(EditSession&&) noexcept = default;
 
-void EditSession::aim(const std::vector<HandleTarget>& targets) { state_->aim(targets); }
+void EditSession::aim(const std::vector<HandleTarget>& targets,
+                      std::shared_ptr<const StartPose> start) {
+  state_->aim(targets, std::move(start));
+}
 
 EditResult EditSession::advance(double milliseconds) {
   if (!state_->aimed) {
@@ -412,10 +477,10 @@ EditResult EditSession::advance(double milliseconds) {
 bool EditSession::settled() const { return state_->aimed && state_->settled(); }
 
 EditResult Editor::solve(const std::vector<HandleTarget>& targets, const EditOptions& options,
-                         ProgressRange progress) const {
+                         ProgressRange progress, std::shared_ptr<const StartPose> start) const {
   // The editor is not owned: the session ends before it.
   EditSession::State state({std::shared_ptr<void>(), this}, options);
-  state.aim(targets);
+  state.aim(targets, std::move(start));
   while (!state.settled()) {
     progress.report(static_cast<double>(state.next) / state.step_count());
     state.step();

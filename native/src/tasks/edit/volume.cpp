@@ -88,7 +88,17 @@ Points EnclosedVolume::gradient(const Points& moved) const {
   return result;
 }
 
-void EnclosedVolume::restore(const HeldSystem& poisson, const Eigen::VectorXi& counts,
+Eigen::VectorXd EnclosedVolume::in(const Points& pose) const {
+  Eigen::VectorXd result = of(pose, gradient(pose));
+  for (Eigen::Index c = 0; c < result.size(); ++c) {
+    if (!(at_rest_[c] > 0.0 && result[c] > kLeast)) {
+      result[c] = 0.0;
+    }
+  }
+  return result;
+}
+
+void EnclosedVolume::restore(const HeldSystem& poisson, const Eigen::VectorXd& kept,
                              Points& moved) const {
   const Points slope = gradient(moved);
   const Points way = poisson.correction(slope);
@@ -105,8 +115,8 @@ void EnclosedVolume::restore(const HeldSystem& poisson, const Eigen::VectorXi& c
   }
   Eigen::VectorXd length = Eigen::VectorXd::Zero(pieces);
   for (Eigen::Index c = 0; c < pieces; ++c) {
-    if (counts[c] != 0 && at_rest_[c] > 0.0 && first[c] > 0.0) {
-      length[c] = root(first[c], second[c], third[c], kShare * (at_rest_[c] - now[c]),
+    if (kept[c] > 0.0 && first[c] > 0.0) {
+      length[c] = root(first[c], second[c], third[c], kShare * (kept[c] - now[c]),
                        kFarthest / std::sqrt(farthest[c]));
     }
   }

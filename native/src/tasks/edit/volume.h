@@ -22,10 +22,14 @@ class EnclosedVolume {
   /// n x 3: gradient of the vertex's own component's volume.
   Points gradient(const Points& moved) const;
 
+  /// A component: the volumes that a pose (n x 3) encloses; 0 where `at_rest` is 0, and where it
+  /// encloses next to nothing.
+  Eigen::VectorXd in(const Points& pose) const;
+
   /// Moves the vertices that are not held, as smoothly as the Poisson equation allows, until each
-  /// component that counts has got back most of the volume it has lost.
-  /// counts: a component; those with 0 stay as they are.
-  void restore(const HeldSystem& poisson, const Eigen::VectorXi& counts, Points& moved) const;
+  /// component has got back most of the volume it has lost.
+  /// kept: a component, its volume before the edit; those with 0 stay as they are.
+  void restore(const HeldSystem& poisson, const Eigen::VectorXd& kept, Points& moved) const;
 
  private:
   const SurfaceOperators& operators_;
