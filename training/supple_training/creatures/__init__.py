@@ -8,14 +8,23 @@ skin's area is about a human body's. Everything random takes a `numpy.random.Gen
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple_training.bodies import HELD_OUT_GRID, self_intersection
 from supple_training.creatures.families import FAMILIES
-from supple_training.creatures.poses import follow, joint_motions, sample_turns, stand
+from supple_training.creatures.poses import (
+    follow,
+    joint_motions,
+    sample_gait,
+    sample_lean,
+    sample_turns,
+    stand,
+)
 from supple_training.creatures.proportions import grown
 from supple_training.creatures.skeleton import FloatArray, Skeleton
 from supple_training.creatures.skin import IntArray, skin, spread
@@ -28,7 +37,12 @@ from supple_training.remesh import (
 
 _ATTEMPTS = 20
 _CREATURES = 5
-"""How many creatures a pair tries before it gives up: one bad draw must not end a long run."""
+"""How many creatures are tried before it is given up: one bad draw must not end a long run."""
+
+WALKERS = ("quadruped", "biped", "sprawler", "bird", "insect")
+"""The families that go on legs."""
+
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -122,6 +136,16 @@ def collapsed_share(rest: FloatArray, posed: FloatArray, faces: IntArray) -> flo
     return float(np.mean(after < 0.1 * before))
 
 
+def _plausible(creature: Creature, posed: FloatArray, allowed: float) -> bool:
+    """Whether a pose keeps volume and faces and cuts into itself by no more than `allowed`."""
+    rest, faces = creature.vertices, creature.faces
+    return bool(
+        abs(volume(posed, faces) / volume(rest, faces) - 1) < 0.12
+        and collapsed_share(rest, posed, faces) < 0.002
+        and self_intersection(posed, faces) <= allowed
+    )
+
+
 def sample_pose(
     creature: Creature, rng: np.random.Generator, *, intersection_limit: float = 0.015
 ) -> FloatArray:
@@ -132,22 +156,54 @@ def sample_pose(
 
     Raises RuntimeError when no pose is free enough of that.
     """
-    rest, faces = creature.vertices, creature.faces
-    allowed = self_intersection(rest, faces) + intersection_limit
-    full = volume(rest, faces)
+    rest = creature.vertices
+    allowed = self_intersection(rest, creature.faces) + intersection_limit
     for attempt in range(_ATTEMPTS):
         turns = sample_turns(creature.skeleton, rng) * (1 - 0.6 * attempt / _ATTEMPTS)
         posed = creature.posed(turns)
-        if (
-            abs(volume(posed, faces) / full - 1) < 0.12
-            and collapsed_share(rest, posed, faces) < 0.002
-            and self_intersection(posed, faces) <= allowed
-        ):
-            return stand(posed, rest, rng)
+        if _plausible(creature, posed, allowed):
+            return stand(posed, rest, sample_lean(rng))
     raise RuntimeError(
         f"no pose out of {_ATTEMPTS} kept self intersection below {allowed:.3f}; "
         "widen intersection_limit or narrow the joint ranges"
     )
+
+
+def walk_cycle(
+    creature: Creature,
+    rng: np.random.Generator,
+    frames: int,
+    *,
+    intersection_limit: float = 0.015,
+) -> FloatArray:
+    """The creature in each frame of a whole stride of a random gait: (frames, n, 3) in metres.
+
+    All frames are as plausible as those of `sample_pose`.
+
+    Raises RuntimeError when no gait is.
+    """
+    rest = creature.vertices
+    allowed = self_intersection(rest, creature.faces) + intersection_limit
+    for attempt in range(_ATTEMPTS):
+        gait = sample_gait(creature.skeleton, rng, frames) * (1 - 0.6 * attempt / _ATTEMPTS)
+        posed = [creature.posed(turns) for turns in gait]
+        if all(_plausible(creature, each, allowed) for each in posed):
+            lean = sample_lean(rng)
+            return np.stack([stand(each, rest, lean) for each in posed])
+    raise RuntimeError(
+        f"no gait out of {_ATTEMPTS} kept self intersection below {allowed:.3f} in all frames; "
+        "widen intersection_limit or narrow the joint ranges"
+    )
+
+
+def retried(make: Callable[[], _T]) -> _T:
+    """What `make` returns, called again where it raises RuntimeError, which is raised at last."""
+    for _ in range(_CREATURES - 1):
+        try:
+            return make()
+        except RuntimeError:
+            continue
+    return make()
 
 
 def make_creature_pair(
@@ -166,15 +222,13 @@ def make_creature_pair(
 
     Raises RuntimeError when no good creature, triangulation or pose is found.
     """
-    for left in reversed(range(_CREATURES)):
-        try:
-            creature = sample_creature(rng, held_out=held_out, vertices=vertices, family=family)
-            source = creature.vertices if at_rest else sample_pose(creature, rng)
-            target = sample_pose(
-                creature.other_proportions(rng) if other_proportions else creature, rng
-            )
-            break
-        except RuntimeError:
-            if not left:
-                raise
-    return source, creature.faces.astype(np.int32), target
+
+    def make() -> tuple[FloatArray, NDArray[np.int32], FloatArray]:
+        creature = sample_creature(rng, held_out=held_out, vertices=vertices, family=family)
+        source = creature.vertices if at_rest else sample_pose(creature, rng)
+        target = sample_pose(
+            creature.other_proportions(rng) if other_proportions else creature, rng
+        )
+        return source, creature.faces.astype(np.int32), target
+
+    return retried(make)

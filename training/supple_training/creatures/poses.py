@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Poses of creatures: strides, free turns of all joints, and the skin that follows them."""
+"""Poses of creatures: strides, free turns of all joints, gaits, and the skin that follows."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ from scipy.spatial.transform import Rotation
 from supple_training.creatures.skeleton import Chain, FloatArray, Skeleton
 
 _BENDING = ("spine", "neck", "tail")
+
+_LAG = 0.9
+"""By how many radians of a stride a joint of a limb follows the one above it."""
 
 
 def _curve(chain: Chain, strong: float, rng: np.random.Generator) -> FloatArray:
@@ -32,7 +35,7 @@ def _limb(
     angle = 2 * np.pi * (moment + chain.phase)
     turns = 0.2 * free
     # Joints down the limb follow later in the stride.
-    turns[:, 0] += reach * np.sin(angle + 0.9 * np.arange(k))
+    turns[:, 0] += reach * np.sin(angle + _LAG * np.arange(k))
     return np.clip(turns, -1.0, 1.0)
 
 
@@ -52,6 +55,33 @@ def sample_turns(skeleton: Skeleton, rng: np.random.Generator) -> FloatArray:
         degrees = np.where(unit > 0, unit * high, -unit * low)
         turns.append(degrees * (np.array([1, -1, -1]) if chain.mirrored else 1))
     return np.concatenate(turns)
+
+
+def sample_gait(skeleton: Skeleton, rng: np.random.Generator, frames: int) -> FloatArray:
+    """A random gait, whole strides that close: (frames, joints, 3) degrees.
+
+    Every angle is a sinusoid of time within a part of the joint's range. Limbs swing as their
+    phases in the stride say; waves run along spines, necks and tails.
+    """
+    time = 2 * np.pi * np.arange(frames)[:, None, None] / frames
+    moment, reach = rng.random(), rng.uniform(0.5, 1.0)
+    turns = []
+    for chain in skeleton.chains:
+        if not chain.joints:
+            continue
+        along = np.arange(chain.joints)[:, None]
+        start = 2 * np.pi * rng.random(3)
+        if chain.kind in _BENDING:
+            share = rng.uniform(0.1, 0.4, 3)
+            start = start + np.pi * rng.uniform(0.0, 2.0) * along / chain.joints
+        else:
+            share = np.array([reach, *rng.uniform(0.0, 0.2, 2)])
+            start[0] = 2 * np.pi * (moment + chain.phase)
+            start = start + _LAG * along
+        low, high = chain.ranges[..., 0], chain.ranges[..., 1]
+        degrees = share * (low + high + (high - low) * np.sin(time + start)) / 2
+        turns.append(degrees * (np.array([1, -1, -1]) if chain.mirrored else 1))
+    return np.concatenate(turns, axis=1)
 
 
 def joint_motions(skeleton: Skeleton, turns: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -108,12 +138,16 @@ def follow(
     return Rotation.from_quat(real).apply(vertices) + shift
 
 
-def stand(posed: FloatArray, rest: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """A pose (n, 3) moved rigidly to fit the rest best, then leant and turned a little at random.
+def sample_lean(rng: np.random.Generator) -> Rotation:
+    """A small random turn, mostly about the vertical."""
+    return Rotation.from_rotvec(np.radians(rng.normal(0.0, [8.0, 5.0, 12.0])))
+
+
+def stand(posed: FloatArray, rest: FloatArray, lean: Rotation) -> FloatArray:
+    """A pose (n, 3) moved rigidly to fit the rest best, then leant about its middle.
 
     Without this, the chain's first joint stays where it is and the far end swings about it.
     """
     middle, rest_middle = posed.mean(axis=0), rest.mean(axis=0)
     fit, _ = Rotation.align_vectors(rest - rest_middle, posed - middle)
-    lean = Rotation.from_rotvec(np.radians(rng.normal(0.0, [8.0, 5.0, 12.0])))
     return (lean * fit).apply(posed - middle) + rest_middle

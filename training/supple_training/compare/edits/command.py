@@ -9,7 +9,6 @@ from typing import Annotated
 
 import supple
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from supple_training.compare import machine
 from supple_training.compare.contender import Contender
@@ -17,22 +16,24 @@ from supple_training.compare.edits import report
 from supple_training.compare.edits.contenders import ARAP, table
 from supple_training.compare.edits.measure import Settings, case_folders, measure
 from supple_training.compare.edits.summary import summary
-from supple_training.console import console
+from supple_training.console import console, percent_bar
 
 CHECKOUT = Path(__file__).parents[4]
 
 
-def _folders(given: list[Path] | None) -> list[Path]:
+def folders_of(given: list[Path] | None, kind: str) -> list[Path]:
+    """Folders of cases of this kind, "edit" or "sequence", by default those in SUPPLE_DATA."""
     if not given:
         data = os.environ.get("SUPPLE_DATA")
         if not data:
             raise typer.BadParameter(
-                "name folders of edit cases, or set SUPPLE_DATA to a folder that has 'edits' in it",
+                f"name folders of {kind} cases, or set SUPPLE_DATA to a folder that has '{kind}s' "
+                "in it",
                 param_hint="DIR",
             )
-        given = [Path(data) / "edits"]
+        given = [Path(data) / f"{kind}s"]
     try:
-        return case_folders(given)
+        return case_folders(given, kind)
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="DIR") from error
 
@@ -81,17 +82,10 @@ def edit(
     Ends with code 1 where a target is missed or a case fails.
     """
     chosen = _chosen(table(iterations), only)
-    found = _folders(folders)
+    found = folders_of(folders, "edit")
     settings = Settings(runs, iterations, model, threads)
     drawn: list[str] = []
-    with Progress(
-        TextColumn("{task.percentage:>3.0f}%"),
-        BarColumn(bar_width=20),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("{task.description}"),
-        console=console,
-    ) as bar:
+    with percent_bar() as bar:
         shown = bar.add_task("", total=len(found))
 
         def done(case, rows, poses) -> None:

@@ -124,42 +124,56 @@ def _supple(bench: Bench, _: int, *, growing: tuple[str, ...] = (), **options: o
     return Work(call, stages=stages, prepare_seconds=prepare, bind_seconds=bench.bind_seconds)
 
 
-def _libigl_arap(bench: Bench, _: int, *, iterations: int) -> Work:
-    """From libigl's usual first guess, the rest shape with the handles' vertices displaced."""
-    import igl
+class LibiglArap:
+    """libigl's ARAP (spokes and rims) of one mesh with these vertices (k,) held."""
 
-    rest = np.ascontiguousarray(bench.case.vertices)
-    faces = np.ascontiguousarray(bench.case.faces, dtype=np.int64)
-    held = held_vertices(bench.case.handles).astype(np.int32)
-    wanted = targets(rest, bench.case.handles)
-    guess = rest.copy()
-    guess[held] = wanted
+    def __init__(self, rest: NDArray, faces: NDArray, held: NDArray) -> None:
+        import igl
 
-    def bind() -> igl.ARAPData:
-        data = igl.ARAPData()
-        data.energy = igl.ARAPEnergyType.ARAP_ENERGY_TYPE_SPOKES_AND_RIMS
-        igl.arap_precomputation(rest, faces, 3, held, data)
-        return data
+        self.rest = np.ascontiguousarray(rest)
+        self.held = held.astype(np.int32)
+        self._data = igl.ARAPData()
+        self._data.energy = igl.ARAPEnergyType.ARAP_ENERGY_TYPE_SPOKES_AND_RIMS
+        triangles = np.ascontiguousarray(faces, dtype=np.int64)
+        igl.arap_precomputation(self.rest, triangles, 3, self.held, self._data)
 
-    data = bind()
+    def guess(self, wanted: NDArray) -> NDArray[np.float64]:
+        """libigl's usual first guess, the rest shape with held vertices at their targets (k, 3)."""
+        vertices = self.rest.copy()
+        vertices[self.held] = wanted
+        return vertices
 
-    def iterate(vertices: NDArray, count: int) -> NDArray[np.float64]:
-        data.max_iter = count
-        posed = igl.arap_solve(wanted, data, vertices)
+    def iterate(self, vertices: NDArray, wanted: NDArray, count: int) -> NDArray[np.float64]:
+        """The vertices (n, 3) after `count` iterations from these.
+
+        Errors: FloatingPointError.
+        """
+        import igl
+
+        self._data.max_iter = count
+        posed = igl.arap_solve(wanted, self._data, vertices)
         if not np.isfinite(posed).all():
             raise FloatingPointError("libigl's result is not finite")
         return posed
+
+
+def _libigl_arap(bench: Bench, _: int, *, iterations: int) -> Work:
+    case = bench.case
+    wanted = targets(case.vertices, case.handles)
+    bind = partial(LibiglArap, case.vertices, case.faces, held_vertices(case.handles))
+    arap = bind()
+    guess = arap.guess(wanted)
 
     def stages() -> Iterator[Stage]:
         # An iteration starts from the vertices alone, so stopping in between changes nothing.
         vertices, done, seconds = guess, 0, 0.0
         for count in [c for c in CHECKPOINTS if c < iterations] + [iterations]:
-            more, vertices = timed(partial(iterate, vertices, count - done))
+            more, vertices = timed(partial(arap.iterate, vertices, wanted, count - done))
             done, seconds = count, seconds + more
             yield done, seconds, vertices
 
     return Work(
-        partial(iterate, guess, 1),
+        partial(arap.iterate, guess, wanted, 1),
         stages=stages,
         bind_seconds=_bind_seconds(bind),
         frame="one iteration",

@@ -38,7 +38,7 @@ class Settings:
     """Ours; None for the library's default."""
 
 
-def case_folders(given: Iterable[Path]) -> list[Path]:
+def case_folders(given: Iterable[Path], kind: str = "edit") -> list[Path]:
     """Case folders among `given`, each one itself or a folder of them, in order of their names.
 
     Errors: ValueError naming a folder that is and holds none.
@@ -50,7 +50,7 @@ def case_folders(given: Iterable[Path]) -> list[Path]:
         else:
             inside = sorted(path.parent for path in folder.glob("*/case.json"))
         if not inside:
-            raise ValueError(f"{folder} is no edit case (it has no case.json) and holds none")
+            raise ValueError(f"{folder} is no {kind} case (it has no case.json) and holds none")
         found += inside
     names = [folder.resolve().name for folder in found]
     twice = next((name for name in names if names.count(name) > 1), None)
@@ -82,6 +82,28 @@ def _reached(work: Work, energy: ArapEnergy, goal: float | None) -> tuple[dict, 
     if len(trace) > 1:
         row["trace"] = trace
     return row, kept
+
+
+FAILURES = (
+    NotAvailable,
+    ImportError,
+    supple.SuppleError,
+    ArithmeticError,
+    ValueError,
+    RuntimeError,
+)
+"""What a contender may raise and be left out for."""
+
+
+def failure(error: Exception) -> dict:
+    """The row of a contender that raised one of `FAILURES`."""
+    if isinstance(error, NotAvailable):
+        status = "not available in this build"
+    elif isinstance(error, ImportError):
+        status = "not installed"
+    else:
+        status = "failed"
+    return {"status": status, "message": str(error)}
 
 
 def _quartiles(values: list[float]) -> dict:
@@ -125,12 +147,8 @@ def measure_case(
             work = contender.setup(bench, threads)
             reached, posed = _reached(work, energy, goal)
             row = figures(case, posed)
-        except NotAvailable as error:
-            rows[name] = {"status": "not available in this build", "message": str(error)}
-        except ImportError as error:
-            rows[name] = {"status": "not installed", "message": str(error)}
-        except (supple.SuppleError, ArithmeticError, ValueError, RuntimeError) as error:
-            rows[name] = {"status": "failed", "message": str(error)}
+        except FAILURES as error:
+            rows[name] = failure(error)
         else:
             works[name], poses[name] = work, posed
             rows[name] = {"status": MEASURED, **row, **reached}

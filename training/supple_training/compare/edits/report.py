@@ -191,7 +191,8 @@ def _case_text(name: str, case: dict) -> str:
     return f"{name}: {case['vertices']:,} vertices, {case['handles']} handles{truth}"
 
 
-def _table(title: str, head: tuple[str, ...], left: int = 1) -> Table:
+def titled_table(title: str, head: tuple[str, ...], left: int = 1) -> Table:
+    """For the terminal, without rows; the first `left` columns are text."""
     table = Table(title=title, title_justify="left")
     for place, column in enumerate(head):
         table.add_column(column, justify="left" if place < left else "right", overflow="fold")
@@ -203,24 +204,25 @@ def tables(made: dict) -> list[Table | str]:
     shown: list[Table | str] = []
     absences: dict[str, None] = {}
     for name, case, cells, missing in _rows(made["measured"]):
-        table = _table(_case_text(name, case), CASE_HEAD)
+        table = titled_table(_case_text(name, case), CASE_HEAD)
         for row in cells:
             table.add_row(*row)
         shown.append(table)
         absences |= dict.fromkeys(f"  {text}" for text in missing)
     summary = made["summary"]
-    table = _table("all cases, least distortion first", SUMMARY_HEAD)
+    table = titled_table("all cases, least distortion first", SUMMARY_HEAD)
     for name, row in summary["contenders"].items():
         table.add_row(*summary_cells(name, row))
     shown += [table, *absences]
     shown += [f"  {name}: {message}" for name, message in made["errors"].items()]
-    targets = _table("targets", VERDICT_HEAD, left=2)
+    targets = titled_table("targets", VERDICT_HEAD, left=2)
     for verdict in summary["verdicts"]:
         targets.add_row(*verdict_cells(verdict))
     return [*shown, targets, network_text(summary["network"])]
 
 
-def _markdown_table(head: tuple[str, ...], rows: list[list[str]], left: int = 1) -> list[str]:
+def markdown_table(head: tuple[str, ...], rows: list[list[str]], left: int = 1) -> list[str]:
+    """Its lines; the first `left` columns are text."""
     rule = "".join("---|" if i < left else "---:|" for i in range(len(head)))
     return ["| " + " | ".join(head) + " |", "|" + rule] + [
         "| " + " | ".join(row) + " |" for row in rows
@@ -235,7 +237,7 @@ def markdown(made: dict, pictures: list[str]) -> str:
     sections: list[str] = []
     for name, case, cells, missing in _rows(made["measured"]):
         sections += ["", f"## {_case_text(name, case)}", ""]
-        sections += _markdown_table(CASE_HEAD, cells)
+        sections += markdown_table(CASE_HEAD, cells)
         absences |= dict.fromkeys(f"- {text}" for text in missing)
         if name in pictures:
             sections += ["", f"![{name}]({name}.png)"]
@@ -251,12 +253,12 @@ def markdown(made: dict, pictures: list[str]) -> str:
         f"of {settings['runs']} in turns. ARAP's energy: how long until the contender's energy is "
         f"no more than ARAP's last (edit.json also has when it is within {NEAR - 1:.0%} of it).",
         "",
-        *_markdown_table(
+        *markdown_table(
             SUMMARY_HEAD,
             [summary_cells(name, row) for name, row in summary["contenders"].items()],
         ),
         "",
-        *_markdown_table(VERDICT_HEAD, [verdict_cells(v) for v in summary["verdicts"]], left=2),
+        *markdown_table(VERDICT_HEAD, [verdict_cells(v) for v in summary["verdicts"]], left=2),
         "",
         network_text(summary["network"]),
     ]

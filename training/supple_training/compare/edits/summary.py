@@ -26,7 +26,7 @@ HANDLE_ERROR = 1e-6
 MET, AIM_MET, MISSED, UNJUDGED = "met", "aim met", "missed", "not judged"
 
 
-def _values(cases: dict[str, dict], contender: str, figure: str) -> dict[str, float]:
+def values(cases: dict[str, dict], contender: str, figure: str) -> dict[str, float]:
     """The figure of each case in which this contender has it."""
     found = {}
     for name, case in cases.items():
@@ -36,13 +36,14 @@ def _values(cases: dict[str, dict], contender: str, figure: str) -> dict[str, fl
     return found
 
 
-def _both(cases: dict, figure: str, one: str, other: str) -> dict[str, tuple[float, float]]:
+def both(cases: dict, figure: str, one: str, other: str) -> dict[str, tuple[float, float]]:
     """The figure of both, for the cases in which both have it."""
-    first, second = _values(cases, one, figure), _values(cases, other, figure)
+    first, second = values(cases, one, figure), values(cases, other, figure)
     return {name: (value, second[name]) for name, value in first.items() if name in second}
 
 
-def _ratio_of_means(pairs: list[tuple[float, float]]) -> float | None:
+def ratio_of_means(pairs: list[tuple[float, float]]) -> float | None:
+    """Of the first numbers to the second; None without pairs."""
     if not pairs:
         return None
     above, below = np.mean(pairs, axis=0)
@@ -51,15 +52,15 @@ def _ratio_of_means(pairs: list[tuple[float, float]]) -> float | None:
 
 def contender_summary(cases: dict[str, dict], contender: str) -> dict:
     """One contender over all cases; None where there is nothing to say."""
-    measured = _values(cases, contender, "symmetric_dirichlet")
-    distortion = _both(cases, "symmetric_dirichlet", contender, ARAP)
+    measured = values(cases, contender, "symmetric_dirichlet")
+    distortion = both(cases, "symmetric_dirichlet", contender, ARAP)
     ratios = {name: max(a, RIGID) / max(b, RIGID) for name, (a, b) in distortion.items()}
     worst = max(ratios, key=ratios.get) if ratios else None
-    errors = _both(cases, "pose_error", contender, ARAP)
+    errors = both(cases, "pose_error", contender, ARAP)
     counts = sorted({cases[name]["handles"] for name in errors})
-    frames = _both(cases, "frame_milliseconds", contender, ARAP)
-    handle = _values(cases, contender, "handle_error")
-    own = list(_values(cases, contender, "pose_error").values())
+    frames = both(cases, "frame_milliseconds", contender, ARAP)
+    handle = values(cases, contender, "handle_error")
+    own = list(values(cases, contender, "pose_error").values())
     return {
         "cases": len(measured),
         "distortion_ratio": float(np.exp(np.mean(np.log(list(ratios.values())))))
@@ -68,25 +69,23 @@ def contender_summary(cases: dict[str, dict], contender: str) -> dict:
         "worst_distortion_ratio": ratios[worst] if worst else None,
         "worst_distortion_case": worst,
         "mean_pose_error": float(np.mean(own)) if own else None,
-        "pose_error_ratio": _ratio_of_means(list(errors.values())),
+        "pose_error_ratio": ratio_of_means(list(errors.values())),
         "pose_error_ratio_by_handles": {
-            str(count): _ratio_of_means(
+            str(count): ratio_of_means(
                 [pair for name, pair in errors.items() if cases[name]["handles"] == count]
             )
             for count in counts
         },
-        "flipped_faces": int(sum(_values(cases, contender, "flipped_faces").values())),
+        "flipped_faces": int(sum(values(cases, contender, "flipped_faces").values())),
         "new_turned_over_faces": int(
-            sum(_values(cases, contender, "new_turned_over_faces").values())
+            sum(values(cases, contender, "new_turned_over_faces").values())
         ),
-        "new_degenerate_faces": int(
-            sum(_values(cases, contender, "new_degenerate_faces").values())
-        ),
+        "new_degenerate_faces": int(sum(values(cases, contender, "new_degenerate_faces").values())),
         "handle_error": max(handle.values()) if handle else None,
         "frame_over_arap_iteration": float(np.median([a / b for a, b in frames.values()]))
         if frames
         else None,
-        "converged": len(_values(cases, contender, "converged_seconds")),
+        "converged": len(values(cases, contender, "converged_seconds")),
     }
 
 
@@ -96,14 +95,14 @@ def network_gain(cases: dict[str, dict]) -> dict | None:
     gain: 1 - the ratio of mean pose errors; low, high: its 95% interval over resampled cases, None
     for a single case; mean_case_gain: the mean of the cases' own gains.
     """
-    pairs = np.array(list(_both(cases, "pose_error", NATURAL, NO_NETWORK).values()))
+    pairs = np.array(list(both(cases, "pose_error", NATURAL, NO_NETWORK).values()))
     if not len(pairs) or not (pairs[:, 1] > 0).all():
         return None
     rng = np.random.default_rng(SEED)
     drawn = pairs[rng.integers(len(pairs), size=(RESAMPLES, len(pairs)))].mean(axis=1)
     low, high = np.percentile(1 - drawn[:, 0] / drawn[:, 1], [2.5, 97.5]).tolist()
     return {
-        "gain": 1 - _ratio_of_means(list(map(tuple, pairs))),
+        "gain": 1 - ratio_of_means(list(map(tuple, pairs))),
         "low": low if len(pairs) > 1 else None,
         "high": high if len(pairs) > 1 else None,
         "mean_case_gain": float(np.mean(1 - pairs[:, 0] / pairs[:, 1])),
@@ -113,7 +112,8 @@ def network_gain(cases: dict[str, dict]) -> dict | None:
     }
 
 
-def _verdict(what: str, target: str, value: float | None, met, aim=None) -> dict:
+def verdict(what: str, target: str, value: float | None, met, aim=None) -> dict:
+    """A target and what `met` and `aim` say of the value, None where it is not known."""
     if value is None:
         word = UNJUDGED
     elif not met(value):
@@ -133,42 +133,42 @@ def verdicts(rows: dict[str, dict], network: dict | None, ours: list[str]) -> li
     held = [rows[name]["handle_error"] for name in ours if rows.get(name, nothing).get("cases")]
     network = network or nothing
     return [
-        _verdict(
+        verdict(
             "stiff: distortion over ARAP's, geometric mean",
             f"<= {STIFF_MEAN}",
             stiff.get("distortion_ratio"),
             lambda value: value <= STIFF_MEAN,
         ),
-        _verdict(
+        verdict(
             "stiff: distortion over ARAP's, worst case",
             f"<= {STIFF_WORST}",
             stiff.get("worst_distortion_ratio"),
             lambda value: value <= STIFF_WORST,
         ),
-        _verdict(
+        verdict(
             "stiff: newly turned over or degenerate faces", "0", turned, lambda value: value == 0
         ),
-        _verdict(
+        verdict(
             "natural: pose error over ARAP's",
             f"<= {POSE}, aim {POSE_AIM}",
             natural.get("pose_error_ratio"),
             lambda value: value <= POSE,
             lambda value: value <= POSE_AIM,
         ),
-        _verdict(
+        verdict(
             "network: nearer to the truth than without",
             f">= {GAIN:.0%}, aim {GAIN_AIM:.0%}",
             network.get("gain"),
             lambda value: value >= GAIN,
             lambda value: value >= GAIN_AIM,
         ),
-        _verdict(
+        verdict(
             "network: lower end of the gain's 95% interval",
             "> 0",
             network.get("low"),
             lambda value: value > 0,
         ),
-        _verdict(
+        verdict(
             "ours: largest handle error, of the diagonal",
             f"<= {HANDLE_ERROR:g}",
             max(held) if held else None,
