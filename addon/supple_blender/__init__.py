@@ -32,12 +32,17 @@ from . import (  # noqa: E402
     pose_operators,
     preferences,
     properties,
+    sequence_operators,
+    sequence_panel,
+    sequence_preview,
+    sequence_properties,
     transfer_operators,
 )
 
 _MODULES = (
     *(preferences, properties, pose_operators, handle_operators, live_operators, panel),
     *(match_properties, match_operators, match_view_operators, landmark_operators),
+    *(sequence_properties, sequence_preview, sequence_operators, sequence_panel),
     *(landmark_click, transfer_operators, match_panel),
 )
 _cli_commands = []

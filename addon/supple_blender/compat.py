@@ -100,6 +100,32 @@ def select_bone(pose_bone, selected):
     (pose_bone if hasattr(pose_bone, "select") else pose_bone.bone).select = selected
 
 
+def _curve_lists(owner):
+    """Return the collections of F-curves that animate `owner`."""
+    data = owner.animation_data
+    action = data.action if data else None
+    if action is None:
+        return []
+    if not hasattr(data, "action_slot"):  # before 4.4 an action is of one owner
+        return [action.fcurves]
+    # An action may be shared: a mesh's shape keys take that of its object, and the reverse.
+    strips = (strip for layer in action.layers for strip in layer.strips)
+    bags = (strip.channelbag(data.action_slot) for strip in strips)
+    return [bag.fcurves for bag in bags if bag is not None]
+
+
+def curves_of(owner):
+    """Return the F-curves that animate `owner` (an object, shape keys, ...), as a list."""
+    return [curve for curves in _curve_lists(owner) for curve in curves]
+
+
+def remove_curve(owner, curve):
+    """Remove one of the F-curves that `curves_of` gave."""
+    for curves in _curve_lists(owner):
+        if curve in list(curves):
+            curves.remove(curve)
+
+
 def is_rendering():
     """Return whether a render runs: it reads the scene from another thread."""
     return bpy.app.is_job_running("RENDER")

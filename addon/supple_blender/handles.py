@@ -164,8 +164,24 @@ def create(context, obj, names=(), held=None):
     return new, left_out
 
 
+def unhang(obj, row):
+    """Let a handle's Empty hang on obj again, and remove the frame that carried it along."""
+    frame, row.frame = row.frame, None
+    if frame is None:
+        return
+    if row.empty and row.empty.parent == frame:
+        row.empty.parent = obj
+        row.empty.matrix_parent_inverse = Matrix(np.array(row.bind).reshape(4, 4).tolist())
+    action = frame.animation_data.action if frame.animation_data else None
+    bpy.data.objects.remove(frame)
+    if action and not action.users:
+        bpy.data.actions.remove(action)
+
+
 def _drop_row(obj, index):
     row = obj.supple.handles[index]
+    if owns(obj, row):
+        unhang(obj, row)
     if row.empty and owns(obj, row):
         bpy.data.objects.remove(row.empty)
     obj.supple.handles.remove(index)
@@ -215,6 +231,7 @@ def rebind(context, obj):
     found = row_vertices(obj)
     mesh_data.leave_mode(obj)
     for row in obj.supple.handles:
+        unhang(obj, row)  # it followed the mesh as it was
         if row.empty and row.empty.parent == obj:
             centroid = rest.positions[found[row.name]].mean(axis=0)
             _place(obj, row, space.bind_matrix(world, centroid))

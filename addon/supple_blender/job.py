@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pose or match without a window, from a job file.
+"""Pose, correct a sequence or match without a window, from a job file.
 
-    blender -b [FILE.blend] --python-exit-code 1 -P job.py -- JOB.toml [--out DIR]
+    blender -b [FILE.blend] --python-exit-code 1 -P job.py -- JOB.toml [--out DIR] [--part K/N]
     blender --command supple JOB.toml [--out DIR]                    (Blender 4.2 and later)
 
 The installed add-on does the work, enabled for this process if it is not; without one, the add-on
@@ -18,19 +18,38 @@ from pathlib import Path
 
 def main(arguments):
     """Run the job that `arguments` (a list of strings) name; return the exit code."""
-    from . import job_file, job_run, job_table, match_job, match_job_run
+    from . import (
+        job_file,
+        job_run,
+        job_table,
+        match_job,
+        match_job_run,
+        sequence_job,
+        sequence_job_run,
+    )
     from .errors import UserError
 
     parser = argparse.ArgumentParser(
-        prog="supple", description="Pose a mesh, or match meshes, from a job file."
+        prog="supple",
+        description="Pose a mesh, correct a sequence, or match meshes, from a job file.",
     )
     parser.add_argument("job", type=Path, help="the job file (TOML)")
     parser.add_argument(
         "--out", type=Path, help="folder for relative output paths (default: the job file's)"
     )
+    parser.add_argument(
+        "--part",
+        default="",
+        help="of a sequence: bake one part of its frames alone, 2/4 for the second of four",
+    )
     options = parser.parse_args(arguments)
     try:
-        if job_table.load(options.job).has("match"):
+        top = job_table.load(options.job)
+        if top.has("sequence"):
+            sequence_job_run.run(sequence_job.read(options.job, options.out, options.part))
+        elif options.part:
+            raise UserError("--part: only a job with a table [sequence] can be done in parts.")
+        elif top.has("match"):
             match_job_run.run(match_job.read(options.job, options.out))
         else:
             job_run.run(job_file.read(options.job, options.out))

@@ -65,27 +65,28 @@ class Job:
     render: Render | None
 
 
-def _source(table, folder):
+def source(table, folder):
+    """Return the Source of table [input], or None for the open file's active object."""
     if table is None:
         return Source(mesh=None, up="Y", groups=None, blend=None, object="")
-    source = Source(
+    found = Source(
         mesh=table.path("mesh", folder),
         up=table.choice("up", ("Y", "Z"), "Y"),
         groups=table.path("groups", folder),
         blend=table.path("blend", folder),
         object=table.take("object", str, ""),
     )
-    if source.mesh and (source.blend or source.object):
+    if found.mesh and (found.blend or found.object):
         raise table.error("mesh", "give either mesh, or blend and object, not both")
     table.end()
     for key in ("mesh", "groups", "blend"):
-        path = getattr(source, key)
+        path = getattr(found, key)
         if path and not path.is_file():
             raise table.error(key, f"there is no file {path}")
-    return source
+    return found
 
 
-def _rotation(table):
+def rotation(table):
     """Return the (3, 3) rotation of a table {axis, degrees}."""
     axis = table.numbers("axis", (3,))
     degrees = table.take("degrees", float, required=True)
@@ -117,7 +118,7 @@ def _move(table):
         return Move(group, None, about_centroid=False, weight=weight)
     if matrix is None:
         motion = np.eye(4)
-        motion[:3, :3] = np.eye(3) if rotate is None else _rotation(rotate)
+        motion[:3, :3] = np.eye(3) if rotate is None else rotation(rotate)
         motion[:3, 3] = 0 if translate is None else translate
         return Move(group, motion, about_centroid=True, weight=weight)
     if not np.array_equal(matrix[3], [0, 0, 0, 1]):
@@ -176,7 +177,7 @@ def read(path, out=None):
     output = top.table("output", required=True)
     job = Job(
         path=path,
-        source=_source(top.table("input"), folder),
+        source=source(top.table("input"), folder),
         moves=_moves(top, path),
         mode=options.choice("mode", ("natural", "stiff"), "natural"),
         network=options.take("network", bool, True),

@@ -60,7 +60,8 @@ def _require_file_order(obj, path, file):
         )
 
 
-def _find(source, file):
+def find_object(source, file):
+    """Return the object that a job_file.Source names; opens its .blend."""
     if source.blend:
         job_output.open_blend(source.blend, file)
     if not source.object:
@@ -139,7 +140,7 @@ def run(job):
     native.supple()
     start = time.perf_counter()
     file = job.path
-    obj = _import(job.source, file) if job.source.mesh else _find(job.source, file)
+    obj = _import(job.source, file) if job.source.mesh else find_object(job.source, file)
     mesh_data.require_writable(obj)
     if job.source.groups:
         _add_groups(obj, job.source.groups, file)

@@ -85,8 +85,11 @@ def _empty_motion(place, obj, row, to_local):
             "Remove the handle, then add its group again."
         )
     evaluated = _evaluated(place, obj, row, empty, "Empty")
-    motion = to_local @ space.as_array(evaluated.matrix_world)
     bind = np.array(row.bind, dtype=np.float64).reshape(4, 4)
+    motion = to_local @ space.as_array(evaluated.matrix_world)
+    if row.frame:  # it carries the Empty along with the mesh; what counts is how the two differ
+        frame = to_local @ place.world_matrix(row.frame)
+        motion = bind @ np.linalg.inv(frame) @ motion
     return motion @ np.linalg.inv(bind), f"Empty '{empty.name}'"
 
 

@@ -92,7 +92,7 @@ def mesh(rest, stages, share=1.0):
     return found
 
 
-def _handles_key(handles):
+def handles_key(handles):
     digest = hashlib.blake2b(digest_size=16)
     for handle in handles:
         digest.update(handle.name.encode() + b"\0")
@@ -107,7 +107,7 @@ def editor(rest, prepared_mesh, handles, model, stages, share):
 
     model: what `supple.Editor` takes as a model, a name or a path (or None: without the network).
     """
-    key = (rest.digest, _handles_key(handles), model)
+    key = (rest.digest, handles_key(handles), model)
     found = _editors.get(key)
     if found is None:
         progress = stages.begin("Binding handles", share)

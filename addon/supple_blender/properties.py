@@ -45,6 +45,11 @@ class SUPPLE_PG_handle(bpy.types.PropertyGroup):
         description="The Empty's matrix at rest in the mesh's local coordinates, row by row",
         size=16,
     )
+    frame: PointerProperty(
+        name="Frame",
+        description="What carries the Empty along with the moving mesh, in a sequence",
+        type=bpy.types.Object,
+    )
     armature: PointerProperty(name="Armature", type=bpy.types.Object)
     bone: StringProperty(name="Bone", description="The bone that moves it, in place of an Empty")
     weight: FloatProperty(

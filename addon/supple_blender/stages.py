@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Progress of a computation with several native calls, readable from another thread."""
 
+import time
+
 from . import native
 
 
@@ -66,3 +68,43 @@ class Part:
     @property
     def cancelled(self):
         return self._stages.cancelled
+
+
+class FrameStages(Stages):
+    """Progress of work on one frame after another, after what comes before the first.
+
+    paused: the work waits as long as it is set.
+    """
+
+    def __init__(self, total=1, label="Baking"):
+        super().__init__()
+        self.paused = False
+        self._total, self._frames = total, 0
+        self._start = self._first = None
+        self._label = label
+
+    def count(self, frames):
+        """Note how many frames are done; those of the first note took no time."""
+        now = time.monotonic()
+        if self._start is None:
+            self._start, self._first = now, frames
+        self._frames, self.label = frames, self._label
+        self._took = now - self._start
+
+    @property
+    def fraction(self):
+        return super().fraction if self._start is None else self._frames / self._total
+
+    @property
+    def seconds_left(self):
+        if self._start is None:
+            return super().seconds_left
+        timed = self._frames - self._first
+        return self._took / timed * (self._total - self._frames) if timed > 0 else None
+
+    def doing(self):
+        if self.paused:
+            return f"Paused at {self.fraction:.0%}"
+        if self._start is None:
+            return super().doing()
+        return f"{self.label} {self._frames} of {self._total}"

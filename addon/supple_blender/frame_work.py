@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that go through frames: synchronous from scripts, a part each tick from the panel.
+
+Blender evaluates a scene on its main thread only. So the work is a generator that reads frames
+there and hands what it read to another thread; where it has to wait, it yields a Future, after a
+frame None. Closing it puts everything back.
+"""
+
+import concurrent.futures
+import time
+
+import bpy
+
+from . import background
+from .errors import CancelledError, UserError
+
+TICK_SECONDS = 0.02
+# Of these, the interface keeps some for itself.
+WORK_SECONDS = 0.1
+
+
+def run(work):
+    """Run a generator of frame work to its end; return what it returned."""
+    while True:
+        try:
+            future = next(work)
+        except StopIteration as end:
+            return end.value
+        if future is not None:
+            concurrent.futures.wait([future])
+
+
+class FrameOperator:
+    """Mixin for operators. Subclasses define `start` and `write`.
+
+    start(context, stages) -> (name of the object, generator); stages(context) -> FrameStages;
+    write(context, result) -> (level, message), with what the generator returned. `stopped` is the
+    message after Esc. All may raise UserError.
+    """
+
+    stopped = "cancelled, nothing was changed"
+    _work = _stages = _timer = _name = None
+
+    def execute(self, context):
+        try:
+            self._stages = self.stages(context)
+            self._name, work = self.start(context, self._stages)
+            return self._finish(context, run(work))
+        except UserError as error:
+            return self._fail(error)
+
+    def invoke(self, context, event):
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
+        if background.running is not None:
+            return self._fail(UserError("Supple is at work already. Wait for it, or press Esc."))
+        try:
+            self._stages = self.stages(context)
+            self._name, self._work = self.start(context, self._stages)
+        except UserError as error:
+            return self._fail(error)
+        background.running = self._stages
+        manager = context.window_manager
+        manager.progress_begin(0, 100)
+        self._timer = manager.event_timer_add(TICK_SECONDS, window=context.window)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        stages = self._stages
+        if event.type == "ESC" and event.value == "PRESS":
+            stages.cancel()
+            stages.paused = False
+        if event.type == "P" and event.value == "PRESS":
+            stages.paused = not stages.paused
+            self._show(context)
+        if event.type in background.NAVIGATION:
+            return {"PASS_THROUGH"}
+        if event.type != "TIMER" or stages.paused:
+            return {"RUNNING_MODAL"}
+        try:
+            if not self._advance():
+                self._show(context)
+                return {"RUNNING_MODAL"}
+            self._leave(context)
+            return self._finish(context, self._result)
+        except CancelledError:
+            self._leave(context)
+            self.report({"INFO"}, f"{self._name}: {self.stopped}")
+            return {"CANCELLED"}
+        except UserError as error:
+            self._leave(context)
+            return self._fail(error)
+
+    def cancel(self, context):
+        """Blender ends the operator, for instance because its window closes."""
+        self._stages.cancel()
+        self._work.close()
+        self._leave(context)
+
+    def _advance(self):
+        """Work until this tick's time is over or there is something to wait for."""
+        until = time.monotonic() + WORK_SECONDS
+        while time.monotonic() < until:
+            if self._waits is not None and not self._waits.done():
+                return False
+            try:
+                self._waits = next(self._work)
+            except StopIteration as end:
+                self._result = end.value
+                return True
+        return False
+
+    _waits = _result = None
+
+    def _finish(self, context, result):
+        level, message = self.write(context, result)
+        self.report({level}, message)
+        return {"FINISHED"}
+
+    def _fail(self, error):
+        self.report({"ERROR"}, str(error))
+        return {"CANCELLED"}
+
+    def _show(self, context):
+        stages = self._stages
+        keys = "stopping" if stages.cancelled else "P pauses, Esc stops"
+        parts = [f"{self._name}: {stages.doing()}", stages.left(), keys]
+        context.window_manager.progress_update(int(100 * stages.fraction))
+        context.workspace.status_text_set("   ".join(part for part in parts if part))
+        background.redraw_sidebars(context)
+
+    def _leave(self, context):
+        background.running = None
+        context.window_manager.event_timer_remove(self._timer)
+        context.window_manager.progress_end()
+        context.workspace.status_text_set(None)
+        background.redraw_sidebars(context)
