@@ -4,13 +4,15 @@
 import bpy
 from bpy.props import EnumProperty, IntProperty, StringProperty
 
-from . import compat, distortion, handle_sources, handles, live, shape_keys
+from . import compat, distortion, handle_sources, handles, live, motion_handles, shape_keys
+from .background import LongOperator
 from .errors import UserError, count, some
-from .pose_operators import active_body
+from .pose_operators import active_body, find_unchanged
 from .properties import KINDS
 
 
-def _names(text):
+def names_in(text):
+    """Return the parts of a text that commas separate."""
     return [name.strip() for name in text.split(",") if name.strip()]
 
 
@@ -58,8 +60,8 @@ class SUPPLE_OT_handles_from_groups(HandleOperator, bpy.types.Operator):
     )
 
     def change(self, context, obj):
-        held = _names(self.held) or None
-        added, left_out = handles.create(context, obj, _names(self.groups), held)
+        held = names_in(self.held) or None
+        added, left_out = handles.create(context, obj, names_in(self.groups), held)
         obj.supple.active_handle = len(obj.supple.handles) - 1
         text = f"{obj.name}: {count(len(added), 'handle', 'handles')} added"
         if left_out:
@@ -115,7 +117,7 @@ class SUPPLE_OT_handles_from_bones(HandleOperator, bpy.types.Operator):
         if armature is None and context.object.type == "ARMATURE":
             armature = context.object
         added, left_out = handle_sources.from_bones(
-            context, obj, armature, _names(self.bones), _names(self.held)
+            context, obj, armature, names_in(self.bones), names_in(self.held)
         )
         text = f"{obj.name}: {count(len(added), 'handle', 'handles')} added"
         if left_out:
@@ -139,6 +141,35 @@ class SUPPLE_OT_propose_handles(HandleOperator, bpy.types.Operator):
         names = handle_sources.propose(context, obj, self.count)
         obj.supple.active_handle = len(obj.supple.handles) - 1
         return "INFO", f"{obj.name}: {count(len(names), 'handle', 'handles')} added"
+
+
+class SUPPLE_OT_handles_from_motion(LongOperator, bpy.types.Operator):
+    """Make handles where the mesh moves most from its rest shape to this frame, or to the other selected mesh, each moved there"""  # noqa: E501
+
+    bl_idname = "supple.handles_from_motion"
+    bl_label = "Motion"
+    bl_options = {"REGISTER", "UNDO"}
+
+    count: IntProperty(name="Handles", default=16, min=1, soft_max=100)
+
+    def collect(self, context):
+        obj = active_body(context)
+        others = [o for o in context.selected_objects if o.type == "MESH" and o != obj]
+        if len(others) > 1:
+            raise UserError(f"{obj.name}: select one other mesh, or none, not {len(others)}.")
+        return motion_handles.collect(context, obj, others[0] if others else None, self.count)
+
+    def compute(self, inputs, stages):
+        return motion_handles.find(inputs, stages)
+
+    def write(self, context, inputs, result):
+        obj = find_unchanged(inputs.name, inputs.rest)
+        names = motion_handles.create(context, obj, inputs, result)
+        obj.supple.active_handle = len(obj.supple.handles) - 1
+        return (
+            "INFO",
+            f"{obj.name}: {count(len(names), 'handle', 'handles')} moved as the mesh moves",
+        )
 
 
 class SUPPLE_OT_handle_remove(HandleOperator, bpy.types.Operator):
@@ -227,6 +258,7 @@ register, unregister = bpy.utils.register_classes_factory(
         SUPPLE_OT_handles_from_selection,
         SUPPLE_OT_handles_from_bones,
         SUPPLE_OT_propose_handles,
+        SUPPLE_OT_handles_from_motion,
         SUPPLE_OT_handle_remove,
         SUPPLE_OT_handles_clear,
         SUPPLE_OT_handle_select,

@@ -36,11 +36,11 @@ class MovingMesh:
 
     Entering finds how many leading modifiers keep the vertex order (`kept`, an index into
     obj.modifiers); leaving puts every modifier back, and with keep_frame=False the frame where it
-    was. Raises UserError.
+    was. bare: read the mesh before all modifiers. Raises UserError.
     """
 
-    def __init__(self, context, obj, keep_frame=False):
-        self._keeps_frame = keep_frame
+    def __init__(self, context, obj, keep_frame=False, bare=False):
+        self._keeps_frame, self._bare = keep_frame, bare
         self._scene, self._layer = context.scene, context.view_layer
         self._name = obj.name
         self._restore = []
@@ -82,11 +82,11 @@ class MovingMesh:
 
     def _switch_off_ours(self, obj):
         for modifier in obj.modifiers:
-            if modifier.name in OURS:
+            if modifier.name in OURS or self._bare:
                 self._off(modifier)
 
     def _find_kept(self, obj):
-        modifiers = [m for m in obj.modifiers if m.show_viewport and m.name not in OURS]
+        modifiers = [m for m in obj.modifiers if m.show_viewport]
         self._layer.update()
         while self._evaluated_count() != self._count:
             if not modifiers:

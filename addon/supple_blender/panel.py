@@ -12,6 +12,7 @@ from .handle_operators import (
     SUPPLE_OT_handles_clear,
     SUPPLE_OT_handles_from_bones,
     SUPPLE_OT_handles_from_groups,
+    SUPPLE_OT_handles_from_motion,
     SUPPLE_OT_handles_from_selection,
     SUPPLE_OT_propose_handles,
     SUPPLE_OT_rebind,
@@ -124,6 +125,7 @@ class SUPPLE_PT_pose(Sidebar, bpy.types.Panel):
         row = column.row(align=True)
         row.operator(SUPPLE_OT_handles_from_bones.bl_idname, icon="ADD")
         row.operator(SUPPLE_OT_propose_handles.bl_idname, text="Propose 12", icon="ADD").count = 12
+        column.operator(SUPPLE_OT_handles_from_motion.bl_idname, icon="ADD").count = 16
 
     def _draw_look(self, layout, body):
         row = layout.split(factor=0.3)

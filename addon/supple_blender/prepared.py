@@ -102,17 +102,18 @@ def handles_key(handles):
     return digest.hexdigest()
 
 
-def editor(rest, prepared_mesh, handles, model, stages, share):
+def editor(rest, prepared_mesh, handles, model, stages, share, from_scratch=False):
     """Return the `supple.Editor` bound to the handles' vertices, made unless it is kept already.
 
     model: what `supple.Editor` takes as a model, a name or a path (or None: without the network).
+    from_scratch: not from one with other handles; the last bits are then those of any session.
     """
-    key = (rest.digest, handles_key(handles), model)
+    key = (rest.digest, handles_key(handles), model, from_scratch)
     found = _editors.get(key)
     if found is None:
         progress = stages.begin("Binding handles", share)
         other = _editors.latest(lambda kept: (kept[0], kept[2]) == (rest.digest, model))
-        if other is not None:
+        if other is not None and not from_scratch:
             found = other.rebind(handles, progress=progress)
         else:
             found = native.supple().Editor(prepared_mesh, handles, model=model, progress=progress)

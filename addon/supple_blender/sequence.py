@@ -107,7 +107,9 @@ class Solver:
         supple, inputs = native.supple(), self._inputs
         handles = pose.native_handles(inputs.rest, inputs.motions)
         self.mesh = prepared.mesh(inputs.rest, stages, share=0.8)
-        editor = prepared.editor(inputs.rest, self.mesh, handles, pose.MODEL, stages, share=0.2)
+        editor = prepared.editor(
+            inputs.rest, self.mesh, handles, pose.MODEL, stages, share=0.2, from_scratch=True
+        )
         self._editor = supple.SequenceEditor(editor, **inputs.options.arguments())
         self._weights = pose.blend_weights(self.mesh, inputs.motions, inputs.blend)
 

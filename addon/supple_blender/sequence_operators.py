@@ -5,6 +5,7 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from . import (
+    inbetween_bake,
     live,
     sequence_bake,
     sequence_frames,
@@ -12,9 +13,10 @@ from . import (
     sequence_output,
     sequence_preview,
 )
-from .errors import count
+from .errors import UserError, count
 from .frame_work import FrameOperator
-from .handle_operators import HandleOperator
+from .handle_operators import HandleOperator, names_in
+from .modifier_stack import INBETWEEN
 from .pose_operators import active_body
 from .stages import FrameStages
 
@@ -150,6 +152,69 @@ class SUPPLE_OT_sequence_remove(HandleOperator, bpy.types.Operator):
         return "INFO", f"{obj.name}: as it was before; {path} is still there"
 
 
+class SUPPLE_OT_inbetween(FrameOperator, bpy.types.Operator):
+    """Fill the range between shape keys: parts turn on arcs and keep their volume, as blending does not"""  # noqa: E501
+
+    bl_idname = "supple.inbetween"
+    bl_label = "In-betweens"
+    bl_options = {"REGISTER", "UNDO"}
+
+    keys: StringProperty(
+        name="Shape Keys",
+        description="The poses, separated by commas; empty for the two in the panel",
+        options={"SKIP_SAVE"},
+    )
+    frames: StringProperty(
+        name="Frames",
+        description="A frame for each, separated by commas; empty to spread them over the range",
+        options={"SKIP_SAVE"},
+    )
+    overwrite: BoolProperty(
+        name="Overwrite",
+        description="Write over shape keys of the same names that Supple did not make",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+
+    def stages(self, context):
+        return FrameStages(_frames(context), "Filling")
+
+    def start(self, context, stages):
+        obj = active_body(context)
+        live.end(keep=True)
+        body = obj.supple_sequence
+        keys = names_in(self.keys) or [body.from_key, body.to_key]
+        steps = max(1, len(keys) - 1)
+        times = [body.first + round(k * (body.last - body.first) / steps) for k in range(len(keys))]
+        if self.frames:
+            times = _whole_numbers(obj, self.frames)
+        inputs = inbetween_bake.collect(context, obj, keys, times)
+        return obj.name, inbetween_bake.to_output(context, obj, inputs, stages, self.overwrite)
+
+    def write(self, context, result):
+        return "INFO", f"{self._name}: in-betweens {result}"
+
+
+def _whole_numbers(obj, text):
+    try:
+        return [int(part) for part in names_in(text)]
+    except ValueError:
+        raise UserError(
+            f"{obj.name}: '{text}' must be whole numbers, separated by commas."
+        ) from None
+
+
+class SUPPLE_OT_inbetween_remove(HandleOperator, bpy.types.Operator):
+    """Take the in-betweens off the mesh; the cache file stays"""
+
+    bl_idname = "supple.inbetween_remove"
+    bl_label = "Remove In-betweens"
+
+    def change(self, context, obj):
+        path = sequence_output.detach(obj, INBETWEEN)
+        return "INFO", f"{obj.name}: as it was before; {path} is still there"
+
+
 register, unregister = bpy.utils.register_classes_factory(
     (
         SUPPLE_OT_sequence_follow,
@@ -159,5 +224,7 @@ register, unregister = bpy.utils.register_classes_factory(
         SUPPLE_OT_sequence_bake,
         SUPPLE_OT_sequence_show,
         SUPPLE_OT_sequence_remove,
+        SUPPLE_OT_inbetween,
+        SUPPLE_OT_inbetween_remove,
     )
 )

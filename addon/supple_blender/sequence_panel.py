@@ -5,8 +5,11 @@ import bpy
 
 from . import background, handles, native, sequence_frames, sequence_keys, sequence_output
 from . import sequence_preview as preview
+from .modifier_stack import INBETWEEN
 from .panel import Sidebar, draw_text
 from .sequence_operators import (
+    SUPPLE_OT_inbetween,
+    SUPPLE_OT_inbetween_remove,
     SUPPLE_OT_sequence_bake,
     SUPPLE_OT_sequence_clear,
     SUPPLE_OT_sequence_follow,
@@ -82,4 +85,25 @@ class SUPPLE_PT_sequence(Sidebar, bpy.types.Panel):
         row.operator(SUPPLE_OT_sequence_remove.bl_idname, text="", icon="X")
 
 
-register, unregister = bpy.utils.register_classes_factory((SUPPLE_PT_sequence,))
+class SUPPLE_PT_inbetween(Sidebar, bpy.types.Panel):
+    bl_label = "In-betweens"
+    bl_parent_id = "SUPPLE_PT_sequence"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.enabled = background.running is None
+        obj = handles.body_of(context.object)
+        body, keys = obj.supple_sequence, obj.data.shape_keys
+        if keys is None:
+            layout.label(text="The mesh has no shape keys", icon="INFO")
+            return
+        layout.prop_search(body, "from_key", keys, "key_blocks")
+        layout.prop_search(body, "to_key", keys, "key_blocks")
+        row = layout.row(align=True)
+        row.operator(SUPPLE_OT_inbetween.bl_idname, text="Fill the Range", icon="IPO_EASE_IN_OUT")
+        if INBETWEEN in obj.modifiers:
+            row.operator(SUPPLE_OT_inbetween_remove.bl_idname, text="", icon="X")
+
+
+register, unregister = bpy.utils.register_classes_factory((SUPPLE_PT_sequence, SUPPLE_PT_inbetween))

@@ -36,6 +36,8 @@ class SUPPLE_PG_sequence(bpy.types.PropertyGroup):
         min=0,
         soft_max=100,
     )
+    from_key: StringProperty(name="From", description="The shape key at the range's start")
+    to_key: StringProperty(name="To", description="The shape key at the range's end")
     output: EnumProperty(name="To", items=OUTPUTS, default="CACHE")
     file: StringProperty(
         name="File",

@@ -37,8 +37,9 @@ def require_free(obj, prefix, frames, overwrite=False):
         shape_keys.require_free(obj, name, overwrite)
 
 
-def write(context, obj, prefix, frames, read, stages):
-    """Write a key for each frame; a generator for `frame_work`. read(frame) -> positions (n, 3).
+def write(context, obj, prefix, frames, read, stages, bare=False):
+    """Write a key for each frame; a generator for `frame_work`. read(frame) -> positions (n, 3);
+    bare: as they are before the modifiers, else after them.
 
     Returns the largest distance between what the keys show and what was read, as a part of the
     mesh's size; raises UserError where modifiers can't be taken back, with the keys removed again.
@@ -48,7 +49,7 @@ def write(context, obj, prefix, frames, read, stages):
     made = []
     farthest = 0.0
     try:
-        with MovingMesh(context, obj) as moving:
+        with MovingMesh(context, obj, bare=bare) as moving:
             size = float(np.linalg.norm(np.ptp(mesh_data.rest_positions(obj), axis=0)))
             for done, (frame, name) in enumerate(zip(frames, names(prefix, frames), strict=True)):
                 moving.go_to(frame)
