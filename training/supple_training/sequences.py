@@ -6,13 +6,11 @@ A folder with
 - mesh.obj: the rest shape, n vertices;
 - case.json: {"handles": [{"name", "vertices": [0-based]}, ...], "about": {...}}, as an edit case of
   `supple.cases` has it, without matrices and positions: these are the truth's in each frame;
-- frames.pc2: the truth, a point cache (PC2), little endian: 12 bytes "POINTCACHE2" and a zero,
-  int32 version 1, int32 n, float32 start, float32 rate, int32 samples, then n x 3 float32 a sample.
+- frames.pc2: the truth, a point cache (`supple.PointCacheReader`), a sample a frame.
 """
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,9 +18,6 @@ import numpy as np
 import supple
 from numpy.typing import NDArray
 from supple.cases import EditCase, read_case
-
-MAGIC = b"POINTCACHE2\0"
-_HEADER = struct.Struct("<12siiffi")
 
 FEWEST_FRAMES = 3
 """An acceleration needs so many."""
@@ -98,25 +93,12 @@ def read_pc2(path: Path) -> NDArray[np.float64]:
     """
     if not path.is_file():
         raise supple.SuppleError("bad_case", f"There is no file {path}.")
-    content = path.read_bytes()
-    if len(content) < _HEADER.size or not content.startswith(MAGIC):
-        raise supple.SuppleError("bad_case", f"{path} is no point cache (PC2).")
-    _, version, count, _, _, samples = _HEADER.unpack_from(content)
-    if version != 1 or count < 0 or samples < 0:
-        raise supple.SuppleError(
-            "bad_case",
-            f"{path} is a point cache of version {version} with {count} points and {samples} "
-            "samples; version 1 and no negative number can be read.",
-        )
-    expected = _HEADER.size + 12 * count * samples
-    if len(content) != expected:
-        raise supple.SuppleError(
-            "bad_case",
-            f"{path} has {len(content)} bytes, but {samples} samples of {count} points need "
-            f"{expected}; write it again.",
-        )
-    positions = np.frombuffer(content, "<f4", offset=_HEADER.size).astype(np.float64)
-    positions = positions.reshape(samples, count, 3)
+    try:
+        cache = supple.PointCacheReader(path)
+        samples = [cache.read(frame) for frame in range(cache.frames)]
+    except supple.SuppleError as error:
+        raise supple.SuppleError("bad_case", str(error)) from error
+    positions = np.array(samples, dtype=np.float64).reshape(-1, cache.points, 3)
     finite = np.isfinite(positions).all(axis=(1, 2))
     if not finite.all():
         raise supple.SuppleError(
@@ -128,5 +110,7 @@ def read_pc2(path: Path) -> NDArray[np.float64]:
 def write_pc2(path: Path, positions: NDArray) -> None:
     """Write (samples, n, 3) positions, one sample a frame from frame 0."""
     samples, count, _ = positions.shape
-    header = _HEADER.pack(MAGIC, 1, count, 0.0, 1.0, samples)
-    path.write_bytes(header + np.ascontiguousarray(positions, "<f4").tobytes())
+    with supple.PointCacheWriter(path, count, frame_count=samples, start=0.0) as cache:
+        for frame, points in enumerate(positions):
+            cache.append(f"{frame:032x}", points)
+    path.with_name(f"{path.name}.keys").unlink()  # of a bake; nothing is baked here

@@ -103,7 +103,8 @@ TEST_F(FromAStartPose, HandlesAreWhereTheirMatricesTakeThePose) {
 
 // The rounds descend sum_f A_f |J_f - S_f Q_f|^2; at their end its gradient is 0 where nothing is
 // held. Written anew, face by face.
-TEST_F(FromAStartPose, RoundsEndWhereTheRotatedPoseFitsBest) {
+TEST_F(FromAStartPose, SlowRoundsEndWhereTheRotatedPoseFitsBest) {
+  const test::Threads use(1);  // of a mesh this small, two would wait for each other
   EditOptions options{.rounds = 10000, .polish = 0, .network = false, .keep_volume = false};
   const Points got = solve(edit.targets, options, bent);
   Points gradient = Points::Zero(got.rows(), 3);
