@@ -268,6 +268,20 @@ def test_the_network_shapes_the_frames(bar, tmp_path):
     assert np.abs(learned[20] - plain[20]).max() > 1e-3 * SIZE
 
 
+def test_from_python_without_operators(addon, bar, tmp_path):
+    """The same bytes as the panel's, and the handles follow."""
+    key_head()
+    bake(bar, tmp_path / "panel.pc2")
+    api = addon("api")
+    api.follow_animation(bar)
+    assert bar.supple.handles["head"].frame
+    baked = api.bake_sequence(bar, tmp_path / "script.pc2")
+    assert (baked.first, baked.last, baked.kept) == (5, 35, 0)
+    for frame, shown in moving.every_frame(bar, (8, 20, 30)).items():
+        other = np.frombuffer((tmp_path / "panel.pc2").read_bytes()[32:], "<f4").reshape(31, -1, 3)
+        assert np.abs(shown - other[frame - 5]).max() < 1e-4 * SIZE
+
+
 def test_clear_removes_the_keys_of_this_frame(bar):
     key_head(frames=(10, 20))
     bpy.context.scene.frame_set(20)

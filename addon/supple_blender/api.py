@@ -6,6 +6,9 @@
     bpy.data.objects["hand.L"].location.z += 0.3
     api.bake(obj, "Wave")
 
+    obj.supple_sequence.first, obj.supple_sequence.last = 30, 90
+    api.bake_sequence(obj, "//walk.pc2")
+
     scan = bpy.data.objects["Scan"]
     api.match(obj, scan)
     api.transfer(obj, scan, {"UVS", "WEIGHTS"})
@@ -19,13 +22,17 @@ import bpy
 
 from . import (
     collecting,
+    frame_work,
     handles,
+    inbetween_bake,
     match_collect,
     match_solving,
     mesh_data,
     motions,
     native,
     pose,
+    sequence_bake,
+    sequence_frames,
     shape_keys,
     transfer_collect,
     transfer_write,
@@ -33,15 +40,18 @@ from . import (
 from . import match as matching
 from . import transfer as carrying
 from .errors import CancelledError, UserError, count
-from .stages import Stages
+from .stages import FrameStages, Stages
 
 __all__ = [
     "CancelledError",
     "UserError",
     "bake",
+    "bake_sequence",
     "check_mesh",
     "collect_pose",
+    "follow_animation",
     "handles_from_groups",
+    "inbetween",
     "match",
     "prepare",
     "rebind",
@@ -99,6 +109,38 @@ def bake(obj, name, overwrite=False, stages=None):
     result = solve(obj, stages)
     shape_keys.write(obj, name, result.positions)
     return result
+
+
+def follow_animation(obj, stages=None):
+    """Let obj's moved handles travel with the mesh over the range set on `obj.supple_sequence`.
+
+    stages: a `stages.FrameStages`, here and below.
+    """
+    wanted = sequence_bake.range_of(obj)
+    stages = stages or FrameStages(len(wanted.frames), "Following")
+    work = sequence_frames.collect(bpy.context, obj, wanted, stages)
+    sequence_frames.attach(bpy.context, obj, wanted, frame_work.run(work))
+
+
+def bake_sequence(obj, file="", overwrite=False, stages=None):
+    """Correct the range set on `obj.supple_sequence` and let obj show it; return the `Baked`.
+
+    file: the PC2 file, may start with "//"; empty for the one set there, or beside the .blend.
+    """
+    if file:
+        obj.supple_sequence.file = str(file)
+    stages = stages or FrameStages(len(sequence_bake.range_of(obj).frames))
+    return frame_work.run(sequence_bake.to_output(bpy.context, obj, stages, overwrite))
+
+
+def inbetween(obj, keys, frames, overwrite=False, stages=None):
+    """Fill the frames between shape keys of obj, by name, each at its frame of `frames`.
+
+    Goes where `obj.supple_sequence` says: a cache beside that of the sequence, or shape keys.
+    """
+    inputs = inbetween_bake.collect(bpy.context, obj, list(keys), list(frames))
+    stages = stages or FrameStages(len(inputs.frames), "Filling")
+    frame_work.run(inbetween_bake.to_output(bpy.context, obj, inputs, stages, overwrite))
 
 
 def match(source, target, start="AUTOMATIC", refine=True, landmarks=(), file="", stages=None):
