@@ -215,6 +215,18 @@ def test_modifiers_after_go_on_after_the_result(bar, tmp_path):
     assert np.abs(after[20] - before[20]).max() > 0.2
 
 
+def test_a_point_cache_is_corrected_like_any_animation(bar, tmp_path):
+    key_head()
+    bake(bar, tmp_path / "input.pc2")
+    bar.modifiers["Supple Sequence"].name = "Input"
+    before = moving.every_frame(bar)
+    key_head(frames=(20,), location=(-0.2, 0, 0))
+    after = bake(bar, tmp_path / "shot.pc2")
+    assert [modifier.name for modifier in bar.modifiers][-2:] == ["Input", "Supple Sequence"]
+    for frame in moving.FRAMES:
+        assert np.array_equal(after[frame], before[frame]) == (not 5 < frame < 35), frame
+
+
 def test_a_change_of_the_vertex_count_is_found_first(bar, tmp_path):
     key_head()
     build = bar.modifiers.new("Build", "BUILD")

@@ -138,6 +138,19 @@ def test_alembic_holds_the_corrected_frames(addon, folder):
     bpy.ops.wm.alembic_import(filepath=str(folder / "out/shot.abc"), as_background_job=False)
     mesh = next(obj for obj in bpy.data.objects if obj.type == "MESH")
     assert np.abs(moving.at(mesh, 20) - samples[15]).max() < 1e-5
+    # And an Alembic cache is corrected like any other animation.
+    before = moving.every_frame(mesh, range(5, 36))
+    for name, vertices in (("feet", range(24)), ("head", range(180, 204))):
+        bodies.add_group(mesh, name, vertices)
+    bpy.context.view_layer.objects.active = mesh
+    bpy.ops.supple.handles_from_groups(groups="feet,head", held="feet")
+    bpy.data.objects["head"].location = (0.1, 0, 0)
+    settings = mesh.supple_sequence
+    settings.first, settings.last, settings.ease_in, settings.ease_out = 10, 30, 8, 8
+    bpy.ops.supple.sequence_bake(file=str(folder / "again.pc2"))
+    after = moving.every_frame(mesh, range(5, 36))
+    for frame in range(5, 36):
+        assert np.array_equal(before[frame], after[frame]) == (not 10 < frame < 30), frame
 
 
 @pytest.mark.parametrize(

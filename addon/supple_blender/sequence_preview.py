@@ -87,8 +87,8 @@ def start(context, obj):
     sequence_output.require_free(obj, PREVIEW)
     preview = _guarded(lambda: Preview(context, obj, Stages()))
     running, ended = preview, ""
-    for handlers in _handlers():
-        handlers.append(_on_change)
+    for handlers, function in _handlers():
+        handlers.append(function)
 
 
 def end(message=""):
@@ -98,14 +98,15 @@ def end(message=""):
     if preview is None:
         return
     ended = message
-    for handlers in _handlers():
-        if _on_change in handlers:
-            handlers.remove(_on_change)
+    for handlers, function in _handlers():
+        if function in handlers:
+            handlers.remove(function)
     preview.end()
 
 
 def _handlers():
-    return bpy.app.handlers.frame_change_post, bpy.app.handlers.depsgraph_update_post
+    handlers = bpy.app.handlers
+    return ((handlers.frame_change_post, _on_change), (handlers.depsgraph_update_post, _on_update))
 
 
 def _guarded(call):
@@ -116,6 +117,17 @@ def _guarded(call):
         return call()
     finally:
         _busy = False
+
+
+@bpy.app.handlers.persistent
+def _on_update(scene, depsgraph=None):
+    """As `_on_change`, where something else than the mesh itself changed: that the preview does."""
+    if running is None or depsgraph is None:
+        return
+    moving = (bpy.types.Object, bpy.types.Armature, bpy.types.Key, bpy.types.Action)
+    changed = [u.id.original for u in depsgraph.updates if isinstance(u.id, moving)]
+    if any(owner.name != running.name for owner in changed):
+        _on_change(scene, depsgraph)
 
 
 @bpy.app.handlers.persistent
