@@ -6,6 +6,7 @@ import bpy
 import moving
 import numpy as np
 import pytest
+from mathutils import Matrix
 
 SIZE = float(np.linalg.norm([0.6, 0.6, bodies.HEIGHT]))
 
@@ -110,7 +111,7 @@ def test_the_interior_follows_smoothly_and_keeps_its_shape(bar, tmp_path):
 
 
 def test_the_result_is_native_data(package, bar, tmp_path):
-    """With the add-on disabled, every frame is as it was with it, and in a render too."""
+    """With the add-on disabled, every frame is as it was with it."""
     key_head()
     after = bake(bar, tmp_path / "shot.pc2")
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
@@ -123,6 +124,49 @@ def test_the_result_is_native_data(package, bar, tmp_path):
         for frame, expected in after.items():
             assert np.array_equal(moving.at(again, frame), expected), frame
             assert modifier.show_render == modifier.show_viewport == (5 <= frame <= 35)
+    finally:
+        bpy.ops.preferences.addon_enable(module=package)
+
+
+def picture(path):
+    """Render the scene from a fixed camera; return the pixels."""
+    scene = bpy.context.scene
+    if scene.camera is None:
+        scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+        scene.collection.objects.link(scene.camera)
+        scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 4.0
+        scene.camera.matrix_world = Matrix.Translation((0.5, -6, 1)) @ Matrix.Rotation(
+            np.radians(90), 4, "X"
+        )
+        light = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+        scene.collection.objects.link(light)
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples, scene.cycles.use_denoising = 4, False
+    scene.render.resolution_x = scene.render.resolution_y = 64
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(str(path), check_existing=False)
+    return np.array(image.pixels[:])
+
+
+def test_a_render_shows_the_baked_frame(package, bar, tmp_path):
+    """Without the add-on: the same pixels as a still mesh of the baked positions."""
+    key_head(location=(0.6, 0, 0.2))
+    after = bake(bar, tmp_path / "shot.pc2")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.preferences.addon_disable(module=package)
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+        bar = bpy.data.objects["Bar"]
+        bpy.context.scene.frame_set(20)
+        shown = picture(tmp_path / "after.png")
+        bar.modifiers["Supple Sequence"].filepath = str(tmp_path / "none.pc2")
+        without = picture(tmp_path / "before.png")
+        still = bodies.add_mesh("Still", after[20], [p.vertices[:] for p in bar.data.polygons])
+        still.matrix_world = bar.matrix_world
+        bar.hide_render = True
+        assert np.abs(picture(tmp_path / "still.png") - shown).max() <= 1 / 255
+        assert np.abs(without - shown).mean() > 0.01
     finally:
         bpy.ops.preferences.addon_enable(module=package)
 
