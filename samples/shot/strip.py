@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Render a strip of frames of walk_corrected.blend: the animation above, the correction below.
 
-    blender -b walk_corrected.blend -P samples/shot/strip.py -- --out walk.png
+blender -b walk_corrected.blend -P samples/shot/strip.py -- --out walk.png
 """
 
 import argparse
@@ -24,6 +24,8 @@ def set_up(scene):
     scene.render.resolution_x, scene.render.resolution_y = SIZE
     scene.render.resolution_percentage = 100
     scene.render.image_settings.file_format = "PNG"
+    scene.render.image_settings.color_mode = "RGB"
+    scene.render.image_settings.compression = 100
     scene.render.dither_intensity = 0  # noise makes a PNG three times as large
     scene.view_settings.view_transform = "Standard"
     scene.world = bpy.data.worlds.new("Strip")
@@ -34,8 +36,8 @@ def set_up(scene):
     shading.color_type = "OBJECT"
     shading.background_type = "WORLD"
     shading.show_shadows = shading.show_cavity = True
-    shading.shadow_intensity = 0.25
-    scene.display.light_direction = (-0.5, -0.35, 0.8)
+    shading.shadow_intensity = 0.3
+    scene.display.light_direction = (0.1, 0.9, 0.25)
 
 
 def picture(scene, frame, folder):
@@ -55,13 +57,11 @@ def row(scene, folder):
     return np.concatenate([part for each in pictures for part in (each, gap)][:-1], axis=1)
 
 
-def save(pixels, path):
+def save(scene, pixels, path):
     height, width = pixels.shape[:2]
     image = bpy.data.images.new("Strip", width, height)
     image.pixels[:] = np.concatenate([pixels, np.ones((height, width, 1))], axis=2).ravel()
-    image.file_format = "PNG"
-    image.filepath_raw = str(path)
-    image.save()
+    image.save_render(str(path), scene=scene)
 
 
 def main(arguments):
@@ -76,7 +76,7 @@ def main(arguments):
         human.modifiers.remove(human.modifiers["Supple Sequence"])
         before = row(scene, Path(folder))
     gap = np.ones((GAP, after.shape[1], 3), dtype=np.float32)
-    save(np.concatenate([after, gap, before]), path)  # rows of pixels count from the bottom
+    save(scene, np.concatenate([after, gap, before]), path)  # rows of pixels count from the bottom
     print(f"wrote {path}")
 
 
