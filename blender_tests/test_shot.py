@@ -140,7 +140,7 @@ def test_the_other_foot_stays(shot):
 def test_the_foot_lands_on_the_step_instead_of_in_it(shot):
     foot = shot.members("foot.R")
     for frame in ON_STEP:
-        assert shot.inside(shot.before[frame][foot]).mean() > 0.8, frame
+        assert shot.inside(shot.before[frame][foot]).mean() > 0.75, frame
         assert 0 < shot.above(shot.after[frame][foot]) < 0.01, frame  # it does not hover
     assert not any(shot.inside(points).any() for points in shot.after.values())
     standing = np.array([shot.after[frame][shot.sole] for frame in FLAT])
@@ -151,8 +151,8 @@ def test_the_knee_bends_and_the_leg_keeps_its_length(stiff_shot):
     (before, lengths), (after, new_lengths) = (
         stiff_shot.knee(np.float64(of[45])) for of in (stiff_shot.before, stiff_shot.after)
     )
-    assert after > before + 10
-    assert np.allclose(new_lengths, lengths, rtol=0.04)
+    assert after > before + 5
+    assert np.allclose(new_lengths, lengths, rtol=0.03)
 
 
 def test_the_rest_of_the_body_follows_in_its_shape(stiff_shot):
@@ -163,4 +163,4 @@ def test_the_rest_of_the_body_follows_in_its_shape(stiff_shot):
     ]
     assert np.abs(np.percentile(length[1] / length[0], (1, 99)) - 1).max() < 0.05
     rise = (after - before)[stiff_shot.members("head")]
-    assert np.abs(rise - [0, 0, 0.05]).max() < 0.01  # as the hips do
+    assert np.abs(rise - [0, 0, 0.055]).max() < 0.01  # as the hips do

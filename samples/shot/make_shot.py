@@ -24,7 +24,7 @@ FRAMES = range(1, 121)
 FRAMES_A_SECOND = 24
 
 STEPPED_ON = 1  # the right foot's stance on the step, by number
-STEP_HEIGHT = 0.1
+STEP_HEIGHT = 0.08
 STEP_X = (-0.32, -0.02)  # below the right foot alone
 STEP_BEHIND, STEP_AHEAD = 0.1, 0.33  # of the ankle that stands
 
