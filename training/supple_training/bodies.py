@@ -200,12 +200,10 @@ def _sample_bones(rng: np.random.Generator) -> dict[str, FloatArray]:
     return bones
 
 
-def vertices(phenotype: FloatArray, bones: dict[str, FloatArray] | None = None) -> FloatArray:
-    """The body's surface: (13348, 3) in metres.
-
-    `phenotype` is (11,) in [0, 1]; `bones` has a (3, 3) rotation in the bone's own frame for each
-    bone that moves, None the rest pose.
-    """
+def _posed(
+    phenotype: FloatArray, bones: dict[str, FloatArray] | None
+) -> tuple[FloatArray, FloatArray]:
+    """The posed surface (13348, 3) and the starts of the posed bones, (bones, 3)."""
     import torch
 
     model = _model()
@@ -215,7 +213,24 @@ def vertices(phenotype: FloatArray, bones: dict[str, FloatArray] | None = None) 
     named = dict(zip(PHENOTYPES, phenotype.tolist(), strict=True))
     with torch.no_grad():
         result = model(torch.from_numpy(pose), phenotype_kwargs=named)
-    return result["vertices"][0].numpy().astype(np.float64)
+    points, starts = result["vertices"][0], result["bone_poses"][0, :, :3, 3]
+    return points.numpy().astype(np.float64), starts.numpy().astype(np.float64)
+
+
+def vertices(phenotype: FloatArray, bones: dict[str, FloatArray] | None = None) -> FloatArray:
+    """The body's surface: (13348, 3) in metres.
+
+    `phenotype` is (11,) in [0, 1]; `bones` has a (3, 3) rotation in the bone's own frame for each
+    bone that moves, None the rest pose.
+    """
+    return _posed(phenotype, bones)[0]
+
+
+def joints(
+    phenotype: FloatArray, bones: dict[str, FloatArray] | None = None
+) -> dict[str, FloatArray]:
+    """Where each bone starts: name -> (3,) in metres. Arguments as for `vertices`."""
+    return dict(zip(_model().bone_labels, _posed(phenotype, bones)[1], strict=True))
 
 
 def self_intersection(points: FloatArray, faces: IntArray, samples: int = 1500) -> float:
