@@ -168,6 +168,12 @@ def test_alembic_holds_the_corrected_frames(addon, folder):
         ("shot.pc2", "shot.abc", "output.cache: must end in .pc2"),
         ('object = "Bar"', 'object = "Bus"', "input.object: there is no object 'Bus'"),
         ("[output]", "[options]\nmode = 'soft'\n[output]", "options.mode: must be one of"),
+        ("[output]", "[options]\nstiffness = 2\n[output]", "options.stiffness: must be 0"),
+        (
+            "[output]",
+            "[options]\nmode = 'stiff'\nstiffness = 0.5\n[output]",
+            "options.stiffness: give either mode or stiffness",
+        ),
         ("report =", 'alembic = "a.usd"\nreport =', "output.alembic: must end in .abc"),
     ],
 )

@@ -9,6 +9,7 @@ import numpy as np
 from . import job_table
 from .errors import UserError
 
+STIFFNESS = {"natural": 0.0, "stiff": 1.0}
 ENGINES = {"cycles": "CYCLES", "workbench": "BLENDER_WORKBENCH"}
 
 
@@ -55,7 +56,7 @@ class Job:
     path: Path
     source: Source
     moves: list
-    mode: str
+    stiffness: float
     network: bool
     keep_volume: bool
     key: str
@@ -97,6 +98,20 @@ def rotation(table):
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     angle = np.radians(degrees)
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def stiffness(options):
+    """Return the stiffness, 0 to 1, that table [options] gives by `mode` or number, or None."""
+    has_mode = options.has("mode")
+    mode = options.choice("mode", tuple(STIFFNESS), "natural")
+    value = options.take("stiffness", float)
+    if value is None:
+        return STIFFNESS[mode] if has_mode else None
+    if has_mode:
+        raise options.error("stiffness", "give either mode or stiffness, not both")
+    if not 0 <= value <= 1:
+        raise options.error("stiffness", f"must be 0 (natural) to 1 (stiff), not {value}")
+    return value
 
 
 def _move(table):
@@ -179,7 +194,7 @@ def read(path, out=None):
         path=path,
         source=source(top.table("input"), folder),
         moves=_moves(top, path),
-        mode=options.choice("mode", ("natural", "stiff"), "natural"),
+        stiffness=stiffness(options) or 0.0,
         network=options.take("network", bool, True),
         keep_volume=options.take("keep_volume", bool, True),
         key=output.take("shape_key", str, required=True),

@@ -24,7 +24,6 @@ from .stages import Stages
 
 # The other axis of an OBJ: bodies with Y up look along Z, as Blender's own default has it.
 FORWARD = {"Y": "NEGATIVE_Z", "Z": "Y"}
-STIFFNESS = {"natural": 0.0, "stiff": 1.0}
 
 
 def _import(source, file):
@@ -111,7 +110,7 @@ def _pose(job, obj):
     groups.require_members(obj.name, found)
     moves = [_motion(move, found[move.group], rest, world) for move in job.moves]
     options = pose.Options(
-        stiffness=STIFFNESS[job.mode], network=job.network, keep_volume=job.keep_volume
+        stiffness=job.stiffness, network=job.network, keep_volume=job.keep_volume
     )
     pose_input = pose.PoseInput(rest=rest, motions=moves, options=options)
     return pose_input, pose.solve(pose_input, Stages())
@@ -124,7 +123,7 @@ def _report(job, pose_input, result, seconds):
         "vertices": len(rest.positions),
         "faces": len(rest.triangles),
         "handles": {m.group: "held" if m.matrix is None else "moved" for m in job.moves},
-        "mode": job.mode,
+        "stiffness": job.stiffness,
         "network": job.network,
         "shape_key": job.key,
         "notes": result.notes,

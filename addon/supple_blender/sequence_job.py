@@ -41,7 +41,7 @@ class SequenceJob:
     last: int
     ease: tuple
     handles: list | None
-    mode: str | None
+    stiffness: float | None
     network: bool | None
     keep_volume: bool | None
     cache: Path | None
@@ -143,7 +143,6 @@ def read(path, out=None, part=""):
     options = top.table("options") or job_table.Table({}, file, "options.")
     first, last = _whole(table, "frames", 2)
     ease = tuple(_whole(table, "ease", 2, [12, 12]))
-    mode = options.take("mode", str)
     job = SequenceJob(
         path=file,
         source=job_file.source(top.table("input"), folder),
@@ -151,7 +150,7 @@ def read(path, out=None, part=""):
         last=last,
         ease=ease,
         handles=_handles(top, file),
-        mode=mode,
+        stiffness=job_file.stiffness(options),
         network=options.take("network", bool),
         keep_volume=options.take("keep_volume", bool),
         cache=output.path("cache", out, suffix=".pc2"),
@@ -170,8 +169,6 @@ def read(path, out=None, part=""):
         raise table.error("frames", f"ends at {last}, before its start at {first}")
     if min(ease) < 0:
         raise table.error("ease", "must be 0 frames or more")
-    if mode not in (None, "natural", "stiff"):
-        raise options.error("mode", f"must be one of natural, stiff, not '{mode}'")
     if (job.cache is None) != job.shape_keys:
         raise output.error("cache", "give either cache, or shape_keys = true")
     if job.part and job.shape_keys:

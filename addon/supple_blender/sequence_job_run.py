@@ -59,8 +59,8 @@ def _set(job, obj):
     settings.first, settings.last = job.first, job.last
     settings.ease_in, settings.ease_out = job.ease
     settings.output = "KEYS" if job.shape_keys else "CACHE"
-    if job.mode is not None:
-        obj.supple.stiffness = job_run.STIFFNESS[job.mode]
+    if job.stiffness is not None:
+        obj.supple.stiffness = job.stiffness
     if job.network is not None:
         obj.supple.network = job.network
     if job.keep_volume is not None:
