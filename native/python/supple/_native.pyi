@@ -206,19 +206,7 @@ class InitialMap:
     @property
     def notes(self) -> list[Note]: ...
     @property
-    def part_of_motion(
-    matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"],
-    centre: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[1, 3]"],
-    part: typing.SupportsFloat | typing.SupportsIndex,
-) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]: ...
-def range_share(
-    frame: typing.SupportsFloat | typing.SupportsIndex,
-    first: typing.SupportsFloat | typing.SupportsIndex,
-    last: typing.SupportsFloat | typing.SupportsIndex,
-    ease_in: typing.SupportsFloat | typing.SupportsIndex,
-    ease_out: typing.SupportsFloat | typing.SupportsIndex,
-) -> float: ...
-def point_map(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
+    def point_map(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
     @property
     def score(self) -> MapScore: ...
 
@@ -624,6 +612,18 @@ def network_gradient(
     rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 9]"],
     grad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 9]"],
 ) -> dict[str, typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]"]]: ...
+def part_of_motion(
+    matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"],
+    centre: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[1, 3]"],
+    part: typing.SupportsFloat | typing.SupportsIndex,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]: ...
+def range_share(
+    frame: typing.SupportsFloat | typing.SupportsIndex,
+    first: typing.SupportsFloat | typing.SupportsIndex,
+    last: typing.SupportsFloat | typing.SupportsIndex,
+    ease_in: typing.SupportsFloat | typing.SupportsIndex,
+    ease_out: typing.SupportsFloat | typing.SupportsIndex,
+) -> float: ...
 def point_map(
     source: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
     source_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
