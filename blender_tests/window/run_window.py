@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A person's path through the panel, in a real Blender window under Xvfb.
 
-    python blender_tests/window/run_window.py [--out out/window]
+    python blender_tests/window/run_window.py [--out out/window] [--parts sequence ...]
 
 Needs Xvfb, a `blender` (or the program that SUPPLE_BLENDER names) and the packaged add-on in dist/.
 Screenshots go to --out. The exit code is 0 when every check in scenario.py held.
@@ -23,6 +23,9 @@ LIMIT_SECONDS = 1200  # it takes about two minutes; a busy machine, many
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "window")
+    parser.add_argument(
+        "--parts", nargs="+", default=[], help="of scenario.py, by name (the default is all)"
+    )
     arguments = parser.parse_args()
     blender = os.environ.get("SUPPLE_BLENDER", "blender")
     programs = [shutil.which(name) for name in ("xvfb-run", blender)]
@@ -46,7 +49,7 @@ def main():
             *(programs[0], "--auto-servernum", "-s", "-screen 0 1280x800x24", programs[1]),
             *("--factory-startup", "--enable-event-simulate", "-p", "0", "0", "1280", "800"),
             *("--python-exit-code", "1", "-P", str(FOLDER / "scenario.py")),
-            *("--", str(arguments.out.resolve())),
+            *("--", str(arguments.out.resolve()), *arguments.parts),
         ]
         # A file, not a pipe: a window that hangs would keep a pipe open.
         with tempfile.TemporaryFile("w+") as output:

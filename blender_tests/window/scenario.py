@@ -18,6 +18,7 @@ import install  # noqa: E402
 import live_parts  # noqa: E402
 import match_parts  # noqa: E402
 import numpy as np  # noqa: E402
+import sequence_parts  # noqa: E402
 from robot import Robot  # noqa: E402
 
 # Pixels from the window's lower left corner, in Blender 3.4 with its default layout. A click that
@@ -218,11 +219,9 @@ def cancel_long_work(robot):
     say(f"Esc ended a bake of {count} vertices and left everything as it was")
 
 
-def scenario(robot):
-    yield from robot.wait(2)
-    bpy.ops.ed.undo_push(message="Start")
-    yield from open_the_tab(robot)
-    for part in (
+# Those of a name go on from where the ones before them ended.
+PARTS = {
+    "pose": (
         make_handles,
         drag_the_head,
         bake,
@@ -231,14 +230,25 @@ def scenario(robot):
         overwrite_only_when_told,
         bake_in_edit_mode,
         handles_in_edit_mode,
-        *live_parts.PARTS,
-        *carrier_parts.PARTS,
-        cancel_long_work,
-        *match_parts.PARTS,
-    ):
-        yield from part(robot)
+    ),
+    "live": live_parts.PARTS,
+    "carrier": carrier_parts.PARTS,
+    "cancel": (cancel_long_work,),
+    "match": match_parts.PARTS,
+    "sequence": sequence_parts.PARTS,
+}
+
+
+def scenario(robot, names):
+    yield from robot.wait(2)
+    bpy.ops.ed.undo_push(message="Start")
+    yield from open_the_tab(robot)
+    for name in names or PARTS:
+        for part in PARTS[name]:
+            yield from part(robot)
 
 
 start()
-robot = Robot(sys.argv[-1])
-robot.run(scenario(robot))
+out, *names = sys.argv[sys.argv.index("--") + 1 :]
+robot = Robot(out)
+robot.run(scenario(robot, names))
