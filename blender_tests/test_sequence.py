@@ -123,7 +123,7 @@ def test_the_result_is_native_data(package, bar, tmp_path):
         assert modifier.filepath == "//shot.pc2" or modifier.filepath == str(tmp_path / "shot.pc2")
         for frame, expected in after.items():
             assert np.array_equal(moving.at(again, frame), expected), frame
-            assert modifier.show_render == modifier.show_viewport == (5 <= frame <= 35)
+            assert modifier.show_render == modifier.show_viewport == (5 <= frame < 35)
     finally:
         bpy.ops.preferences.addon_enable(module=package)
 
@@ -298,6 +298,101 @@ def test_as_shape_keys(bar, tmp_path):
         assert np.abs(keyed[frame] - expected).max() < 1e-4 * SIZE, frame
     assert "Sequence 0005" in bar.data.shape_keys.key_blocks
     assert "Supple Sequence" not in bar.modifiers
+    # Again, over fewer frames: from the animation alone, and no key of before is left.
+    bar.supple_sequence.first, bar.supple_sequence.last = 10, 30
+    assert bpy.ops.supple.sequence_bake() == {"FINISHED"}
+    keys = [key.name for key in bar.data.shape_keys.key_blocks if "Sequence" in key.name]
+    assert keys == [f"Sequence {frame:04}" for frame in range(10, 31)]
+    bar.supple_sequence.output = "CACHE"
+    bpy.ops.supple.sequence_show(show=False)
+    assert all(np.array_equal(moving.at(bar, f), before[f]) for f in moving.FRAMES)
+    bpy.ops.supple.sequence_show(show=True)
+    bpy.ops.supple.sequence_remove()
+    assert not any("Sequence" in key.name for key in bar.data.shape_keys.key_blocks)
+    assert all(np.allclose(moving.at(bar, f), before[f], atol=1e-6) for f in moving.FRAMES)
+
+
+def test_shape_keys_that_fail_leave_those_of_before(addon, bar, tmp_path):
+    key_head()
+    bar.supple_sequence.output = "KEYS"
+    bpy.ops.supple.sequence_bake()
+    shown, state = moving.every_frame(bar), bodies.everything()
+    key_head(frames=(25,), location=(-0.3, 0, 0))
+    stages = addon("stages").FrameStages(31)
+    work = addon("sequence_bake").to_output(bpy.context, bar, stages)
+    for step, future in enumerate(work):
+        if future is not None:
+            future.exception()
+        if step == 50:
+            work.close()
+            break
+    bpy.ops.supple.sequence_clear()
+    assert {f: p.tobytes() for f, p in moving.every_frame(bar).items()} == {
+        f: p.tobytes() for f, p in shown.items()
+    }
+    bpy.context.scene.frame_set(22)
+    assert sorted(bodies.everything()) == sorted(state)
+
+
+def test_what_comes_after_stays_after_in_a_second_bake(bar, tmp_path):
+    key_head()
+    bake(bar, tmp_path / "shot.pc2")
+    bar.modifiers.new("Cast", "CAST").factor = 0.3
+    before = [modifier.name for modifier in bar.modifiers]
+    once = moving.at(bar, 20)
+    bake(bar, tmp_path / "shot.pc2")
+    assert [m.name for m in bar.modifiers] == [*before[:-2], "Cast", "Supple Sequence"]
+    plain = bar.modifiers["Supple Sequence"].show_viewport = False
+    assert plain is False and not np.array_equal(once, moving.at(bar, 3))
+
+
+def test_files_of_others_are_not_written_over(bar, tmp_path):
+    key_head()
+    bake(bar, tmp_path / "input.pc2")
+    bar.modifiers["Supple Sequence"].name = "Input"
+    content = (tmp_path / "input.pc2").read_bytes()
+    with pytest.raises(RuntimeError, match="is read by modifier 'Input' of 'Bar'"):
+        bpy.ops.supple.sequence_bake(file=str(tmp_path / "input.pc2"))
+    (tmp_path / "other.pc2").write_bytes(b"another program's")
+    with pytest.raises(RuntimeError, match="was not baked by Supple"):
+        bpy.ops.supple.sequence_bake(file=str(tmp_path / "other.pc2"))
+    assert (tmp_path / "input.pc2").read_bytes() == content
+
+
+def test_a_duplicate_does_not_take_the_originals_handles(bar):
+    key_head()
+    bpy.ops.supple.sequence_follow()
+    copy = bar.copy()
+    copy.data = bar.data.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    bpy.context.view_layer.objects.active = copy
+    with pytest.raises(RuntimeError, match="its handles are those of 'Bar'"):
+        bpy.ops.supple.sequence_bake(file="/tmp/none.pc2")
+    bpy.ops.supple.handles_clear()
+    assert "head" in bpy.data.objects and bar.supple.handles["head"].frame
+    assert bpy.data.objects["head"].animation_data.action
+
+
+def test_an_undo_brings_no_preview_back(bar, tmp_path):
+    key_head()
+    bpy.ops.supple.sequence_preview()
+    bpy.context.scene.frame_set(20)
+    bpy.ops.ed.undo_push(message="with the preview")
+    bpy.ops.supple.sequence_preview()
+    bpy.ops.ed.undo_push(message="without")
+    bpy.ops.ed.undo()
+    assert "Supple Sequence Preview" not in bpy.data.objects["Bar"].modifiers
+
+
+def test_what_is_unusual_is_said(bar, tmp_path, capfd):
+    key_head(frames=(8,))
+    bar.supple_sequence.last = 15
+    bpy.ops.supple.sequence_bake(file=str(tmp_path / "shot.pc2"))
+    assert "The eases leave no frame of the range its whole correction" in capfd.readouterr().out
+    scene = bpy.context.scene
+    scene.render.frame_map_new = 200
+    with pytest.raises(RuntimeError, match="the scene's time is remapped"):
+        bpy.ops.supple.sequence_bake(file=str(tmp_path / "shot.pc2"))
 
 
 def test_the_preview_shows_what_the_bake_will(bar, tmp_path):

@@ -71,7 +71,7 @@ class FrameOperator:
         if event.type == "ESC" and event.value == "PRESS":
             stages.cancel()
             stages.paused = False
-        if event.type == "P" and event.value == "PRESS":
+        if event.type == "P" and event.value == "PRESS" and not stages.cancelled:
             stages.paused = not stages.paused
             self._show(context)
         if event.type in background.NAVIGATION:
@@ -91,6 +91,10 @@ class FrameOperator:
         except UserError as error:
             self._leave(context)
             return self._fail(error)
+        except BaseException:  # a fault of ours: Blender says so, and all goes on
+            self._work.close()
+            self._leave(context)
+            raise
 
     def cancel(self, context):
         """Blender ends the operator, for instance because its window closes."""
@@ -124,7 +128,8 @@ class FrameOperator:
 
     def _show(self, context):
         stages = self._stages
-        keys = "stopping" if stages.cancelled else "P pauses, Esc stops"
+        keys = "P goes on, Esc stops" if stages.paused else "P pauses, Esc stops"
+        keys = "stopping" if stages.cancelled else keys
         parts = [f"{self._name}: {stages.doing()}", stages.left(), keys]
         context.window_manager.progress_update(int(100 * stages.fraction))
         context.workspace.status_text_set("   ".join(part for part in parts if part))

@@ -21,7 +21,8 @@ def world_matrix(context, obj):
 
 def owns(obj, handle):
     """Return whether the row `handle` is obj's own, not one that came with a duplicated object."""
-    parent = handle.empty.parent if handle.empty else None
+    carried = handle.frame or handle.empty  # its frame, where it travels with the mesh
+    parent = carried.parent if carried else None
     if parent is None or parent == obj or parent.type != "MESH":
         return True
     return all(row.empty != handle.empty for row in parent.supple.handles)
@@ -33,8 +34,9 @@ def body_of(obj):
     """
     if obj is None or obj.type == "MESH":
         return obj
-    if obj.parent and any(row.empty == obj for row in obj.parent.supple.handles):
-        return obj.parent
+    parent = obj.parent.parent if obj.parent and obj.parent.type == "EMPTY" else obj.parent
+    if parent and any(row.empty == obj for row in parent.supple.handles):
+        return parent
     for other in bpy.data.objects:
         if any(obj in (row.empty, row.armature) for row in other.supple.handles):
             return other

@@ -19,10 +19,7 @@ from . import (
     shape_key_frames,
 )
 from .errors import CancelledError, UserError
-from .modifier_stack import INBETWEEN
-
-# Of shape keys: 'Between 0012'.
-KEY_PREFIX = "Between"
+from .modifier_stack import INBETWEEN, INBETWEEN_KEYS
 
 
 def collect(context, obj, keys, times):
@@ -64,7 +61,7 @@ def to_output(context, obj, inputs, stages, overwrite=False):
     it was.
     """
     if obj.supple_sequence.output == "KEYS":
-        shape_key_frames.require_free(obj, KEY_PREFIX, inputs.frames, overwrite)
+        shape_key_frames.require_free(obj, INBETWEEN_KEYS, inputs.frames, overwrite)
         with tempfile.TemporaryDirectory(prefix="supple-") as folder:
             path = Path(folder) / "frames.pc2"
             yield from _written(inputs, path, stages)
@@ -72,7 +69,7 @@ def to_output(context, obj, inputs, stages, overwrite=False):
             yield from shape_key_frames.write(
                 context,
                 obj,
-                KEY_PREFIX,
+                INBETWEEN_KEYS,
                 inputs.frames,
                 lambda frame: reader.read(frame - inputs.frames[0]),
                 stages,
@@ -80,11 +77,11 @@ def to_output(context, obj, inputs, stages, overwrite=False):
             )
         return "as shape keys"
     sequence_output.require_free(obj, INBETWEEN)
-    path = file_of(obj)
+    path, name = file_of(obj), obj.name
+    sequence_bake.require_free_file(obj, path, overwrite)
     yield from _written(inputs, path, stages)
-    obj = bpy.data.objects[obj.name]
-    frames = inputs.frames
-    sequence_output.attach_cache(obj, INBETWEEN, path, frames[0], frames[-1], 0)
+    obj = bpy.data.objects[name]
+    sequence_output.attach_cache(obj, INBETWEEN, path, inputs.frames, after="")
     return f"in {path.name}"
 
 

@@ -4,6 +4,8 @@
 Supple's own modifiers, and those after that place, are switched off while it is read.
 """
 
+import re
+
 import bpy
 import numpy as np
 
@@ -13,6 +15,8 @@ from .errors import UserError, count
 # Names of Supple's modifiers: the baked result, the preview while scrubbing, and in-betweens.
 RESULT, PREVIEW, INBETWEEN = "Supple Sequence", "Supple Sequence Preview", "Supple In-betweens"
 OURS = (RESULT, PREVIEW)
+# Of shape keys for frames: 'Sequence 0012'.
+SEQUENCE_KEYS, INBETWEEN_KEYS = "Sequence", "Between"
 
 # These move vertices and never add or remove one.
 DEFORMING = {
@@ -24,19 +28,39 @@ DEFORMING = {
 }
 
 
-def _is_visibility_of(curve, modifier):
-    return curve.data_path in (
-        f'modifiers["{modifier.name}"].show_viewport',
-        f'modifiers["{modifier.name}"].show_render',
-    )
+def _curve(obj, path):
+    """Return the F-curve of a data path of obj, or None."""
+    return next((curve for curve in compat.curves_of(obj) if curve.data_path == path), None)
+
+
+def _key(obj, name):
+    keys = obj.data.shape_keys
+    return keys.key_blocks.get(name) if keys else None
+
+
+def visibility_paths(modifier_name):
+    """Return the data paths of a modifier's visibility, on its object."""
+    name = bpy.utils.escape_identifier(modifier_name)
+    return [f'modifiers["{name}"].{shown}' for shown in ("show_viewport", "show_render")]
+
+
+def recorded_keys(obj, prefix):
+    """Return the names of shape keys that Supple wrote for frames: 'Sequence 0012'."""
+    keys = obj.data.shape_keys
+    pattern = re.compile(rf"{re.escape(prefix)} -?\d+")
+    recorded = (record.name for record in obj.supple.keys)
+    return [n for n in recorded if keys and n in keys.key_blocks and pattern.fullmatch(n)]
 
 
 class MovingMesh:
     """A context in which the vertices of obj can be read at any frame, as animated.
 
-    Entering finds how many leading modifiers keep the vertex order (`kept`, an index into
-    obj.modifiers); leaving puts every modifier back, and with keep_frame=False the frame where it
-    was. bare: read the mesh before all modifiers. Raises UserError.
+    Entering finds how many leading modifiers keep the vertex order; what they are followed by, and
+    what Supple made of the sequence before, is off. Leaving puts everything back, and with
+    keep_frame=False the frame. bare: read the mesh before all modifiers. Raises UserError.
+
+    after: the name of the modifier that the result comes after, '' to come first. skipped: names of
+    modifiers after that place that deform, too.
     """
 
     def __init__(self, context, obj, keep_frame=False, bare=False):
@@ -44,8 +68,8 @@ class MovingMesh:
         self._scene, self._layer = context.scene, context.view_layer
         self._name = obj.name
         self._restore = []
-        self.kept = 0
         self._count = len(obj.data.vertices)
+        self.after, self.skipped = "", []
 
     @property
     def obj(self):
@@ -60,6 +84,11 @@ class MovingMesh:
                 f"{obj.name}: it is hidden in this view layer, so Blender does not move it. "
                 "Show it first (the eye in the Outliner)."
             )
+        if self._scene.render.frame_map_old != self._scene.render.frame_map_new:
+            raise UserError(
+                f"{obj.name}: the scene's time is remapped. Set Old and New to one value "
+                "(Properties > Output > Time Stretching), or bake in another scene."
+            )
         self._frame = self._scene.frame_current_final
         try:
             self._switch_off_ours(obj)
@@ -72,40 +101,65 @@ class MovingMesh:
     def __exit__(self, *_):
         self._leave()
 
-    def _off(self, modifier):
-        for curve in compat.curves_of(self.obj):
-            if _is_visibility_of(curve, modifier) and not curve.mute:
-                curve.mute = True
-                self._restore.append((curve, "mute", False))
-        self._restore.append((modifier, "show_viewport", modifier.show_viewport))
-        modifier.show_viewport = False
+    # Whatever is changed is found by its name again: an undo, or a bake, may have replaced it.
+
+    def _set(self, find, attribute, value):
+        owner = find(self.obj)
+        before = getattr(owner, attribute)
+        if before != value:
+            self._restore.append((find, attribute, before))
+            setattr(owner, attribute, value)
+
+    def _off(self, name):
+        for path in visibility_paths(name):
+            if _curve(self.obj, path):
+                self._set(lambda obj, path=path: _curve(obj, path), "mute", True)
+        self._set(lambda obj: obj.modifiers.get(name), "show_viewport", False)
 
     def _switch_off_ours(self, obj):
         for modifier in obj.modifiers:
             if modifier.name in OURS or self._bare:
-                self._off(modifier)
+                self._off(modifier.name)
+        for prefix in (SEQUENCE_KEYS, INBETWEEN_KEYS) if self._bare else (SEQUENCE_KEYS,):
+            for name in recorded_keys(obj, prefix):
+                self._set(lambda obj, name=name: _key(obj, name), "mute", True)
 
     def _find_kept(self, obj):
-        modifiers = [m for m in obj.modifiers if m.show_viewport]
+        kept = [m.name for m in obj.modifiers if m.show_viewport and m.name not in OURS]
+        off = []
+        for index, modifier in enumerate(obj.modifiers):
+            keyed = any(_curve(obj, path) for path in visibility_paths(modifier.name))
+            if keyed and modifier.name not in OURS and modifier.type not in DEFORMING:
+                # On at some frames: what it adds would be found there.
+                later = [m.name for m in obj.modifiers[index:]]
+                off = [name for name in kept if name in later]
+                kept = [name for name in kept if name not in later]
+                self._off(modifier.name)
+                break
+        for name in off:
+            self._off(name)
         self._layer.update()
         while self._evaluated_count() != self._count:
-            if not modifiers:
+            if not kept:
                 raise UserError(
                     f"{obj.name}: Blender shows {self._evaluated_count():,} vertices of its "
                     f"{self._count:,} even without modifiers. Is it hidden or edited elsewhere?"
                 )
-            self._off(modifiers.pop())
+            off.insert(0, kept.pop())
+            self._off(off[0])
             self._layer.update()
-        self.kept = obj.modifiers.find(modifiers[-1].name) + 1 if modifiers else 0
-        self.may_change_count = any(m.type not in DEFORMING for m in modifiers)
+        self.after = kept[-1] if kept else ""
+        types = {m.name: m.type for m in obj.modifiers}
+        self.skipped = [name for name in off if types[name] in DEFORMING]
+        self.may_change_count = any(types[name] not in DEFORMING for name in kept)
 
     def _leave(self):
-        try:
-            while self._restore:
-                owner, name, value = self._restore.pop()
-                setattr(owner, name, value)
-        except ReferenceError:  # an undo or another file took them away
-            return
+        while self._restore:
+            find, attribute, value = self._restore.pop()
+            obj = bpy.data.objects.get(self._name)
+            owner = find(obj) if obj else None
+            if owner is not None:
+                setattr(owner, attribute, value)
         if not self._keeps_frame:
             whole = int(np.floor(self._frame))
             self._scene.frame_set(whole, subframe=self._frame - whole)

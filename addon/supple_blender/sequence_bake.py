@@ -23,27 +23,24 @@ from . import (
     sequence_output,
     shape_key_frames,
 )
-from .errors import CancelledError, UserError, count
-from .modifier_stack import RESULT, MovingMesh
+from .errors import CancelledError, UserError, count, some
+from .modifier_stack import INBETWEEN, OURS, RESULT, SEQUENCE_KEYS, MovingMesh
 
 # Frames read and not yet written: as many bytes as one frame times this, whatever the range.
 BATCH = 8
-
-# Of shape keys: 'Sequence 0012'.
-KEY_PREFIX = "Sequence"
 
 
 @dataclass(frozen=True)
 class Baked:
     """What a bake did. kept: how many of the frames were taken from files of earlier ones.
-    modifier_index: where in the stack the result belongs. notes: of the mesh.
+    after: the modifier that the result comes after, '' to come first. notes: for people.
     """
 
     path: Path | None
     first: int
     last: int
     kept: int
-    modifier_index: int
+    after: str
     notes: list
 
 
@@ -120,10 +117,7 @@ class CacheWriter:
         keys = [self._keys.of(frame) for frame in frames]
         known = [self._guarded(lambda key=key: self._known.find(key)) for key in keys]
         missing = [frame for frame, found in zip(frames, known, strict=True) if found is None]
-        progress = native.supple().Progress()
-        if self._stages.cancelled:
-            raise CancelledError
-        solved = iter(self._solver.solve(missing, progress))
+        solved = iter(self._solver.solve(missing, self._stages.watch()))
         for key, found in zip(keys, known, strict=True):
             positions = next(solved) if found is None else found
             self._guarded(lambda key=key, p=positions: self._file.append(key, p))
@@ -156,7 +150,7 @@ def bake(context, obj, range, path, stages, frames=None, pieces=()):
     with MovingMesh(context, obj) as moving:
         moving.go_to(range.first)
         inputs = collect(context, obj, range)
-        index = moving.kept
+        after, notes = moving.after, _notes(moving, range)
         yield from moving.check_counts(frames)
         reader = FrameReader(context, moving, inputs)
         writer = CacheWriter(path, inputs, frames, pieces, stages)
@@ -166,7 +160,24 @@ def bake(context, obj, range, path, stages, frames=None, pieces=()):
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
             writer.close()
-    return Baked(path, frames[0], frames[-1], writer.kept, index, writer.notes)
+    return Baked(path, frames[0], frames[-1], writer.kept, after, [*writer.notes, *notes])
+
+
+def _notes(moving, range):
+    """Return what a user would want to know of how the range is corrected, for people."""
+    notes = []
+    if moving.skipped:
+        notes.append(
+            f"Modifier {some(moving.skipped)} comes after one that adds or removes vertices, so it "
+            "acts on the corrected mesh; move it up to correct what it does"
+        )
+    most = max(range.share(frame) for frame in range.frames)
+    if most < 1:
+        notes.append(
+            f"The eases leave no frame of the range its whole correction, at most {most:.0%}; make "
+            "them shorter or the range longer"
+        )
+    return notes
 
 
 def _bake(reader, writer, pool, frames, stages):
@@ -212,14 +223,16 @@ def to_output(context, obj, stages, overwrite=False, pieces=()):
     """
     wanted = range_of(obj)
     if obj.supple_sequence.output == "KEYS":
-        shape_key_frames.require_free(obj, KEY_PREFIX, wanted.frames, overwrite)
+        shape_key_frames.require_free(obj, SEQUENCE_KEYS, wanted.frames, overwrite)
         return (yield from _to_keys(context, obj, wanted, stages))
     sequence_output.require_free(obj)
-    baked = yield from bake(context, obj, wanted, file_of(obj), stages, pieces=pieces)
-    obj = bpy.data.objects[obj.name]
-    sequence_output.attach_cache(
-        obj, RESULT, baked.path, baked.first, baked.last, baked.modifier_index
-    )
+    path = file_of(obj)
+    require_free_file(obj, path, overwrite)
+    name = obj.name
+    baked = yield from bake(context, obj, wanted, path, stages, pieces=pieces)
+    obj = bpy.data.objects[name]
+    ends_at_rest = wanted.share(wanted.last) == 0
+    sequence_output.attach_cache(obj, RESULT, path, wanted.frames, baked.after, ends_at_rest)
     return baked
 
 
@@ -231,7 +244,7 @@ def _to_keys(context, obj, wanted, stages):
         yield from shape_key_frames.write(
             context,
             obj,
-            KEY_PREFIX,
+            SEQUENCE_KEYS,
             wanted.frames,
             lambda frame: reader.read(frame - wanted.first),
             stages,
@@ -245,6 +258,25 @@ def sentence(baked):
     where = f"in {baked.path.name}" if baked.path else "as shape keys"
     kept = f", {baked.kept} of them as they were baked before" if baked.kept else ""
     return ". ".join([f"{frames} {where}{kept}", *baked.notes])
+
+
+def require_free_file(obj, path, overwrite=False):
+    """Raise UserError if a cache at `path` is another's: read by another modifier, or not baked."""
+    for other in bpy.data.objects:
+        for modifier in other.modifiers:
+            ours = other == obj and modifier.name in (*OURS, INBETWEEN)
+            if modifier.type != "MESH_CACHE" or ours or not modifier.filepath:
+                continue
+            if Path(bpy.path.abspath(modifier.filepath)).resolve() == path.resolve():
+                raise UserError(
+                    f"{obj.name}: {path.name} is read by modifier '{modifier.name}' of "
+                    f"'{other.name}'. Name another cache file."
+                )
+    if path.exists() and not path.with_name(f"{path.name}.keys").exists() and not overwrite:
+        raise UserError(
+            f"{obj.name}: {path.name} is there and was not baked by Supple. Name another cache "
+            "file, or move that one away."
+        )
 
 
 def file_of(obj):

@@ -25,11 +25,17 @@ def collect(context, obj, range, stages):
     CancelledError.
     """
     with MovingMesh(context, obj) as moving:
+        if moving.skipped:
+            raise UserError(
+                f"{obj.name}: modifier '{moving.skipped[0]}' moves it after one that adds or "
+                "removes vertices, so where its vertices are can't be told. Move it up."
+            )
         moving.go_to(range.first)
         place = motions.Place.of(context)
         world = place.world_matrix(obj)
         rest = mesh_data.collect(obj, world)
         vertices = motions.vertices_of(obj)
+        motions.collect(place, obj, world, vertices)  # raises where an Empty is gone
         rows = [row for row in obj.supple.handles if row.kind != "HELD" and not row.bone]
         if not rows:
             raise UserError(
@@ -80,13 +86,15 @@ def attach(context, obj, range, frames):
     """Make the frames follow: what `collect` returned. Handles' Empties keep their own motion."""
     mesh_data.leave_mode(obj)
     scene = context.scene
-    now = scene.frame_current
+    now = scene.frame_current_final
     scene.frame_set(range.first)
-    world = Matrix(handles.world_matrix(context, obj).tolist())
-    for row in obj.supple.handles:
-        if row.name in frames:
-            _follow(obj, row, world, range, frames[row.name])
-    scene.frame_set(now)
+    try:
+        world = Matrix(handles.world_matrix(context, obj).tolist())
+        for row in obj.supple.handles:
+            if row.name in frames and row.empty:
+                _follow(obj, row, world, range, frames[row.name])
+    finally:
+        scene.frame_set(int(now // 1), subframe=now % 1)
 
 
 def _follow(obj, row, world, range, values):

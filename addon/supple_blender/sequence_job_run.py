@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Running a job that corrects a sequence. The cache is finished first, then all else is written."""
 
+import glob
 import sys
 import time
 
@@ -71,7 +72,7 @@ def _set(job, obj):
 
 def _pieces(cache):
     """Return the caches that parts of the job have baked."""
-    return sorted(cache.parent.glob(f"{cache.stem}.*-of-*.pc2"))
+    return sorted(cache.parent.glob(f"{glob.escape(cache.stem)}.*-of-*.pc2"))
 
 
 def _piece(job):

@@ -149,7 +149,8 @@ class SUPPLE_OT_sequence_remove(HandleOperator, bpy.types.Operator):
 
     def change(self, context, obj):
         path = sequence_output.detach(obj)
-        return "INFO", f"{obj.name}: as it was before; {path} is still there"
+        kept = f"; {path} is still there" if path else ""
+        return "INFO", f"{obj.name}: as it was before{kept}"
 
 
 class SUPPLE_OT_inbetween(FrameOperator, bpy.types.Operator):

@@ -39,8 +39,9 @@ class SUPPLE_PT_sequence(Sidebar, bpy.types.Panel):
         row.prop(body, "first")
         row.prop(body, "last")
         row = column.row(align=True)
-        row.prop(body, "ease_in")
-        row.prop(body, "ease_out")
+        row.label(text="Ease")
+        row.prop(body, "ease_in", text="In")
+        row.prop(body, "ease_out", text="Out")
         self._draw_keys(layout, context, obj)
         self._draw_output(layout, obj)
 
@@ -52,7 +53,7 @@ class SUPPLE_PT_sequence(Sidebar, bpy.types.Panel):
         icon = "CHECKMARK" if travels else "CON_FOLLOWTRACK"
         layout.operator(SUPPLE_OT_sequence_follow.bl_idname, icon=icon)
         row = layout.row(align=True)
-        row.operator(SUPPLE_OT_sequence_key.bl_idname, icon="KEY_HLT")
+        row.operator(SUPPLE_OT_sequence_key.bl_idname, text="Key", icon="KEY_HLT")
         row.operator(SUPPLE_OT_sequence_clear.bl_idname, icon="KEY_DEHLT")
         keyed = sequence_keys.frames(obj)
         shown = ", ".join(f"{frame:g}" for frame in keyed[:8]) + (" ..." if len(keyed) > 8 else "")

@@ -28,7 +28,7 @@ class Preview:
     def __init__(self, context, obj, stages):
         self.name, self.problem = obj.name, ""
         self._folder = tempfile.TemporaryDirectory(prefix="supple-")
-        self._number = 0
+        self._number, self._file = 0, None
         self._shown = self._keys = self._solver = None
         self.update(context, stages)
 
@@ -42,33 +42,32 @@ class Preview:
             inputs = collect(context, obj, range)
             frame = FrameReader(context, moving, inputs).here(context.scene.frame_current)
             # Over a result that is baked already.
-            index = max(moving.kept, obj.modifiers.find(RESULT) + 1)
+            after = RESULT if RESULT in obj.modifiers else moving.after
         keys = sequence.FrameKeys(inputs)
         key = keys.of(frame)
-        if key == self._shown and PREVIEW in obj.modifiers:
+        modifier = obj.modifiers.get(PREVIEW)
+        if key == self._shown and modifier and modifier.filepath == str(self._file):
             return
         if self._solver is None or keys.shared != self._keys:
             self._solver, self._keys = sequence.Solver(inputs, stages or Stages()), keys.shared
-        self._show(obj, key, self._solver.solve([frame])[0], index)
+        self._show(obj, key, self._solver.solve([frame])[0], after)
         self._shown = key
 
-    def _show(self, obj, key, positions, index):
+    def _show(self, obj, key, positions, after):
         self._number += 1
         path = Path(self._folder.name) / f"{self._number}.pc2"
         writer = native.supple().PointCacheWriter(path, len(positions), frame_count=1)
         writer.append(key, positions)
         writer.finish()
-        sequence_output.show_file(obj, PREVIEW, path, index)
+        sequence_output.show_file(obj, PREVIEW, path, after)
+        self._file = path
         for suffix in ("", ".keys"):
             path.with_name(f"{self._number - 1}.pc2{suffix}").unlink(missing_ok=True)
 
     def hide(self):
         """Remove the modifier; `update` brings it back."""
         self._shown = None
-        obj = snapshot.body(self.name)
-        modifier = obj.modifiers.get(PREVIEW) if obj else None
-        if modifier:
-            obj.modifiers.remove(modifier)
+        _remove_all()
 
     def end(self):
         self.hide()
@@ -148,10 +147,26 @@ def _on_change(scene, depsgraph=None):
         pass
 
 
+def _remove_all():
+    """Remove every preview, also those that an undo, a rename or another session left."""
+    for obj in bpy.data.objects:
+        modifier = obj.modifiers.get(PREVIEW) if obj.type == "MESH" else None
+        if modifier and modifier.type == "MESH_CACHE" and not obj.library:
+            obj.modifiers.remove(modifier)
+
+
+@bpy.app.handlers.persistent
+def _after_undo(*_):
+    if running is None:
+        _remove_all()
+
+
 @bpy.app.handlers.persistent
 def _before_save(*_):
     if running is not None:
         _guarded(running.hide)
+    else:
+        _remove_all()
 
 
 @bpy.app.handlers.persistent
@@ -165,7 +180,13 @@ def _on_load(*_):
     end()
 
 
-_EVENTS = (("save_pre", _before_save), ("save_post", _after_save), ("load_pre", _on_load))
+_EVENTS = (
+    ("save_pre", _before_save),
+    ("save_post", _after_save),
+    ("load_pre", _on_load),
+    ("undo_post", _after_undo),
+    ("redo_post", _after_undo),
+)
 
 
 def register():

@@ -2,7 +2,8 @@
 """A sequence as shape keys: one a frame, with keyed values, for short ranges and game export.
 
 A key acts before the modifiers. Where there is an armature before the result, what a frame is to
-move is taken back through it, vertex by vertex, by Blender's own deformation matrices.
+move is taken back through it, vertex by vertex, by Blender's own deformation matrices. Keys are
+made under other names and take their places when all are done: a failure leaves those of before.
 """
 
 import bpy
@@ -10,7 +11,7 @@ import numpy as np
 
 from . import compat, mesh_data, shape_keys
 from .errors import UserError
-from .modifier_stack import MovingMesh
+from .modifier_stack import MovingMesh, recorded_keys
 
 # As many keys as a file and an exporter bear; more belong in a cache.
 MOST_FRAMES = 120
@@ -41,22 +42,18 @@ def write(context, obj, prefix, frames, read, stages, bare=False):
     """Write a key for each frame; a generator for `frame_work`. read(frame) -> positions (n, 3);
     bare: as they are before the modifiers, else after them.
 
-    Returns the largest distance between what the keys show and what was read, as a part of the
-    mesh's size; raises UserError where modifiers can't be taken back, with the keys removed again.
+    Keys of the same prefix that Supple wrote before go. Raises UserError where modifiers can't be
+    taken back, CancelledError; then obj is as it was.
     """
     mesh_data.leave_mode(obj)
     had_keys = obj.data.shape_keys is not None
-    made = []
-    farthest = 0.0
+    new = names(f"{prefix} ~", frames)
     try:
         with MovingMesh(context, obj, bare=bare) as moving:
             size = float(np.linalg.norm(np.ptp(mesh_data.rest_positions(obj), axis=0)))
-            for done, (frame, name) in enumerate(zip(frames, names(prefix, frames), strict=True)):
+            for done, (frame, name) in enumerate(zip(frames, new, strict=True)):
                 moving.go_to(frame)
-                wanted = read(frame)
-                made.append(name)
-                error = _fit_key(context, moving, name, frame, wanted) / size
-                farthest = max(farthest, error)
+                error = _fit_key(context, moving, name, frame, read(frame)) / size
                 if error > TOLERANCE:
                     raise UserError(
                         f"{obj.name}: at frame {frame} a shape key can't show the result: its "
@@ -65,14 +62,33 @@ def write(context, obj, prefix, frames, read, stages, bare=False):
                     )
                 stages.count(done + 1)
                 yield None
+            final = names(prefix, frames)
+            for name in {*recorded_keys(obj, prefix), *final}:
+                remove(obj, name)
+            for name, wanted in zip(new, final, strict=True):
+                shape_keys.find(obj, name).name = wanted  # its F-curves follow
+                obj.supple.keys[name].name = wanted
     except BaseException:
-        for name in made:
-            if shape_keys.find(obj, name):
-                _remove(obj, name)
+        for name in new:
+            remove(obj, name)
         if not had_keys and obj.data.shape_keys:
             obj.shape_key_clear()
         raise
-    return farthest
+
+
+def remove(obj, name):
+    """Remove shape key `name` with its F-curve, if it is there."""
+    key = shape_keys.find(obj, name)
+    if key is None:
+        return
+    keys = obj.data.shape_keys
+    for curve in compat.curves_of(keys):
+        if curve.data_path == _path(name):
+            compat.remove_curve(keys, curve)
+    obj.shape_key_remove(key)
+    index = obj.supple.keys.find(name)
+    if index >= 0:
+        obj.supple.keys.remove(index)
 
 
 def _fit_key(context, moving, name, frame, wanted):
@@ -111,7 +127,6 @@ def _taken_back(context, moving, away):
 def _write_key(obj, name, positions, frame):
     shape_keys.write(obj, name, positions)
     key = shape_keys.find(obj, name)
-    _remove_curve(obj, name)
     for at, value in ((frame - 1, 0.0), (frame, 1.0), (frame + 1, 0.0)):
         key.value = value
         key.keyframe_insert("value", frame=at)
@@ -123,16 +138,3 @@ def _write_key(obj, name, positions, frame):
 
 def _path(name):
     return f'key_blocks["{bpy.utils.escape_identifier(name)}"].value'
-
-
-def _remove_curve(obj, name):
-    keys = obj.data.shape_keys
-    for curve in compat.curves_of(keys):
-        if curve.data_path == _path(name):
-            compat.remove_curve(keys, curve)
-
-
-def _remove(obj, name):
-    _remove_curve(obj, name)
-    obj.shape_key_remove(shape_keys.find(obj, name))
-    obj.supple.keys.remove(obj.supple.keys.find(name))

@@ -83,6 +83,14 @@ class FrameStages(Stages):
         self._start = self._first = None
         self._label = label
 
+    def watch(self):
+        """Return a `supple.Progress` for native work on frames, which `cancel` ends."""
+        progress = native.supple().Progress()
+        self._progress = progress
+        if self._cancelled:
+            progress.cancel()
+        return progress
+
     def count(self, frames):
         """Note how many frames are done; those of the first note took no time."""
         now = time.monotonic()

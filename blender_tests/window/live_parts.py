@@ -9,11 +9,11 @@ import numpy as np
 
 # As in scenario.py: pixels from the window's lower left corner.
 SELECT_HEAD = (974, 535)
-LIVE = (897, 371)
-BAKE_WHILE_LIVE = (982, 290)
-DISTORTION = (881, 231)
-DISTORTION_ARROW = (864, 231)
-VIEW_IT = (930, 155)
+LIVE = (897, 350)
+BAKE_WHILE_LIVE = (982, 269)
+DISTORTION = (881, 210)
+DISTORTION_ARROW = (864, 210)
+VIEW_IT = (930, 134)
 FAR = 0.05  # of the bar's height of 2
 
 

@@ -173,6 +173,25 @@ TEST_F(FromAStartPose, CollapsedFacesAreBorne) {
   }
 }
 
+// A limb scaled to nothing: vertices that no face with an area is at.
+TEST_F(FromAStartPose, StiffStillDescendsWhereALimbIsAPoint) {
+  Points shrunk = bent;
+  const double height = mesh.vertices.col(2).maxCoeff();
+  for (Eigen::Index v = 0; v < shrunk.rows(); ++v) {
+    if (std::abs(mesh.vertices(v, 2) - 0.5 * height) < 0.25 * height) {
+      shrunk.row(v) = bent.colwise().mean();
+    }
+  }
+  const Points natural = solve(edit.targets, {}, shrunk);
+  for (const EditOptions& options :
+       {EditOptions{.stiffness = 1.0}, EditOptions{.method = EditMethod::arap}}) {
+    const EditResult got = editor->solve(edit.targets, options, {}, start(shrunk));
+    EXPECT_TRUE(got.vertices.allFinite());
+    EXPECT_GT(got.report.passes, 1);
+    EXPECT_GT(test::farthest(got.vertices, natural), 1e-3 * size);
+  }
+}
+
 TEST(StartPose, WhatHasNoHandleStaysWithNothingAsked) {
   const zoo::Mesh two = zoo::with_unused_vertices(zoo::two_spheres(2));
   const auto rest = test::prepared(two);

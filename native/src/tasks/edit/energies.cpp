@@ -52,7 +52,11 @@ MatrixField vertex_rotations(const SurfaceOperators& operators, const MatrixFiel
       total += weights[f];
       sum += weights[f] * jacobians.row(f);
     }
-    sums.row(v) = sum / total;
+    if (total > 0.0) {
+      sums.row(v) = sum / total;
+    } else {  // no face around it has an area in the pose that is edited
+      matrix_at(sums, v).setIdentity();
+    }
   }
   return closest_rotations(sums);
 }
