@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "supple/geometry/surface_operators.h"
 
+#include "neighbours.h"
 #include "supple/geometry/jacobians.h"
 #include "supple/geometry/operators.h"
 

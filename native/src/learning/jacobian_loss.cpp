@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "supple/learning/jacobian_loss.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <string>
 
