@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "softmax.h"
 #include "supple/core/dense.h"
 #include "supple/core/error.h"
 #include "supple/core/nearest_rows.h"
@@ -75,10 +76,7 @@ RowMatrix<double> SoftMap::rows_of_map(const RowMatrix<double>& source) const {
   RowMatrix<double> map = product(source, Op::none, target_, Op::transpose);
 #pragma omp parallel for schedule(static)
   for (Eigen::Index i = 0; i < map.rows(); ++i) {
-    auto row = map.row(i).array();
-    // Of the largest the exponential is 1, so no temperature is too low for it.
-    row = ((row - row.maxCoeff()) / temperature_).exp();
-    row /= row.sum();
+    softmax(map.row(i).data(), map.cols(), temperature_);
   }
   return map;
 }

@@ -74,6 +74,7 @@ TEST(FeatureMap, PenaltiesAreDifferencesOfResolventsOrEigenvalues) {
 }
 
 TEST(FeatureMap, Gradient) {
+  const test::Threads threads(1);  // far too small to share
   Problem p;
   const RowMatrix<double> direction = test::noise(6, 5, 5);
   const auto value = [&] {

@@ -3,13 +3,12 @@
 
 #include <sys/resource.h>
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <random>
 #include <vector>
 
+#include "learning/softmax.h"
 #include "native/gradient_check.h"
 #include "native/support.h"
 
@@ -51,6 +50,28 @@ TEST(SoftMap, IsTheSoftmaxOfTheProducts) {
     EXPECT_LT(largest_difference(map.apply(identity(17)), truth), 1e-10) << temperature;
     EXPECT_LT(largest_difference(map.apply_backward(identity(13)), truth.transpose()), 1e-10);
   }
+}
+
+TEST(Softmax, IsExactToRoundingAtEverySimdLevel) {
+  test::at_every_simd_level([] {
+    for (const Eigen::Index count : {1, 2, 3, 7, 8, 9, 31, 64, 77}) {
+      const RowMatrix<double> start = test::noise(1, count, static_cast<uint64_t>(count));
+      for (const double temperature : {1e-3, 0.07, 1.0, 1e3}) {
+        std::vector<long double> truth;
+        for (const double x : start.reshaped()) {
+          truth.push_back(std::exp((static_cast<long double>(x) - start.maxCoeff()) / temperature));
+        }
+        const long double sum = std::accumulate(truth.begin(), truth.end(), 0.0L);
+        RowMatrix<double> row = start;
+        softmax(row.data(), count, temperature);
+        for (Eigen::Index i = 0; i < count; ++i) {
+          const auto expected = static_cast<double>(truth[static_cast<size_t>(i)] / sum);
+          // The quotient x / temperature is rounded, and its error grows with it.
+          EXPECT_NEAR(row(0, i), expected, expected * 1e-15 * (4.0 + 2.0 / temperature) + 1e-303);
+        }
+      }
+    }
+  });
 }
 
 TEST(SoftMap, TheLowestTemperaturesAreTheHardMap) {
@@ -102,6 +123,7 @@ TEST(SoftMap, BlocksJoinWithoutASeamSlow) {
 }
 
 TEST(SoftMap, Gradients) {
+  const test::Threads threads(1);  // far too small to share
   RowMatrix<double> source = test::noise(9, 4, 1), target = test::noise(11, 4, 2);
   RowMatrix<double> values = test::noise(11, 3, 3);
   const RowMatrix<double> direction = test::noise(9, 3, 4);

@@ -170,6 +170,7 @@ class UnsupervisedLoss : public ::testing::Test {
     return unsupervised_loss(pair, match(pair, features, options), predicted, options).total;
   }
 
+  test::Threads threads{1};  // far too small to share
   Surface first, second;
   SurfacePair pair;
   FeaturePair features;
@@ -271,7 +272,7 @@ TEST_F(UnsupervisedLoss, DoesNotSeeTheOrderOfVertices) {
 }
 
 TEST_F(UnsupervisedLoss, SameThreadsSameBytes) {
-  const test::Threads threads(2);
+  const test::Threads two(2);
   const auto run = [&] {
     const Match forward = match(pair, features, options);
     UnsupervisedLossGradient gradient;
