@@ -33,6 +33,11 @@ JacobianLossValues jacobian_loss(const SurfaceOperators& source, const SparseRow
                     std::to_string(adjacency.rows()) + " faces were given for a surface of " +
                     std::to_string(m) + " faces.");
   }
+  if (!rough.allFinite() || !predicted.allFinite()) {
+    throw Error(ErrorCode::not_finite,
+                "The predicted or rough Jacobians hold NaN or infinity. Check the network; where "
+                "training diverges, lower its learning rate.");
+  }
   const Eigen::VectorXd& areas = source.face_areas;
   const MatrixField fit = predicted - rough;
   const MatrixField roughness = predicted - MatrixField(adjacency * predicted);

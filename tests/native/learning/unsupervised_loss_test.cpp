@@ -124,10 +124,13 @@ TEST_F(JacobianLoss, DoesNotSeeTurnsOfEitherSide) {
   EXPECT_NEAR(loss(turned(rough), turned(predicted)).total, loss(rough, predicted).total, 1e-9);
 }
 
-TEST_F(JacobianLoss, RefusesOtherNumbersOfFaces) {
+TEST_F(JacobianLoss, RefusesOtherNumbersOfFacesAndNaN) {
   const MatrixField field = everywhere(Matrix3::Identity());
   EXPECT_TRUE(test::fails_with(ErrorCode::wrong_shape, {"1 predicted", "20 faces"},
                                [&] { loss(field, field.topRows(1)); }));
+  MatrixField broken = field;
+  broken(3, 4) = std::nan("");
+  EXPECT_TRUE(test::fails_with(ErrorCode::not_finite, {"predicted"}, [&] { loss(field, broken); }));
 }
 
 // --- pairs

@@ -29,7 +29,7 @@ struct JacobianLossGradient {
 ///   sum_f A_f |J' - J|^2 + a6 sum_f A_f |J - H J|^2 + a7 sum_f A_f (det J - 1)^2.
 /// Faces count by their area (the source's is 1), as in `supervised_loss`.
 /// adjacency: H, `face_adjacency`.
-/// Errors: `wrong_shape`.
+/// Errors: `wrong_shape`, `not_finite`.
 JacobianLossValues jacobian_loss(const SurfaceOperators& source, const SparseRowMatrix& adjacency,
                                  const JacobianWeights& weights, const MatrixField& rough,
                                  const MatrixField& predicted,

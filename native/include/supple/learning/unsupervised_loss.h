@@ -87,7 +87,7 @@ struct UnsupervisedLossGradient {
 /// predicted: m_d x 9 each, what the networks make of `coarse`; empty ones leave out L_J.
 /// Where the pulled vertices shrink a face to a point, the derivative of its normal is not bounded;
 /// to train features without it, set the gradient's `pulled` to 0 rows.
-/// Errors: `wrong_shape`.
+/// Errors: `wrong_shape`; `not_finite` for Jacobians.
 UnsupervisedLossValues unsupervised_loss(const SurfacePair& surfaces, const Match& match,
                                          const std::array<MatrixField, 2>& predicted,
                                          const UnsupervisedOptions& options = {},
