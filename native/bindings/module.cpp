@@ -17,4 +17,5 @@ PYBIND11_MODULE(_native, module) {
   supple::bindings::bind_transfer(module);
   supple::bindings::bind_sequence(module);
   supple::bindings::bind_point_cache(module);
+  supple::bindings::bind_unsupervised(module);
 }

@@ -27,6 +27,7 @@ __all__: list[str] = [
     "InitialMap",
     "KeptFrames",
     "MapScore",
+    "MatchDirection",
     "Network",
     "Note",
     "PointCacheReader",
@@ -39,11 +40,14 @@ __all__: list[str] = [
     "Refiner",
     "SequenceEditor",
     "SequenceFrame",
+    "SoftMap",
     "SparseCholesky",
     "SurfaceMap",
     "TrainOptions",
     "TrainingPair",
     "TriangleMesh",
+    "UnsupervisedLoss",
+    "UnsupervisedOptions",
     "automatic_map",
     "blas_name",
     "blend",
@@ -94,6 +98,7 @@ __all__: list[str] = [
     "transfer_field",
     "transfer_groups",
     "transfer_shape_keys",
+    "unsupervised_loss",
     "uv_map",
     "vertex_inversion",
     "within_islands",
@@ -337,6 +342,102 @@ class TrainingPair:
             typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"]
         ] = ...,
     ) -> None: ...
+
+class SoftMap:
+    def __init__(
+        self,
+        source: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        target: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        temperature: typing.SupportsFloat | typing.SupportsIndex = 0.07,
+    ) -> None: ...
+    def apply(
+        self,
+        values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        progress: Progress = None,
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+    def hard_map(
+        self, progress: Progress = None
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
+
+class UnsupervisedOptions:
+    def __init__(self) -> None: ...
+    @property
+    def temperature(self) -> float: ...
+    @temperature.setter
+    def temperature(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def map_weight(self) -> float: ...
+    @map_weight.setter
+    def map_weight(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def map_exponent(self) -> float: ...
+    @map_exponent.setter
+    def map_exponent(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def orthogonality(self) -> float: ...
+    @orthogonality.setter
+    def orthogonality(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def coupling(self) -> float: ...
+    @coupling.setter
+    def coupling(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def bijectivity(self) -> float: ...
+    @bijectivity.setter
+    def bijectivity(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def map_penalty(self) -> str: ...
+    @map_penalty.setter
+    def map_penalty(self, arg1: str) -> None: ...
+    @property
+    def jacobian_weights(self) -> typing.Annotated[list[float], "FixedSize(3)"]: ...
+    @jacobian_weights.setter
+    def jacobian_weights(
+        self,
+        arg1: typing.Annotated[
+            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"
+        ],
+    ) -> None: ...
+
+class MatchDirection:
+    @property
+    def map(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+    @property
+    def soft_map(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+    @property
+    def pulled(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+    @property
+    def coarse(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+
+class UnsupervisedLoss:
+    @property
+    def match(self) -> typing.Annotated[list[MatchDirection], "FixedSize(2)"]: ...
+    @property
+    def grad_features(
+        self,
+    ) -> typing.Annotated[
+        list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]], "FixedSize(2)"
+    ]: ...
+    @property
+    def grad_predicted(
+        self,
+    ) -> typing.Annotated[
+        list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]], "FixedSize(2)"
+    ]: ...
+    @property
+    def orthogonality(self) -> float: ...
+    @property
+    def coupling(self) -> float: ...
+    @property
+    def bijectivity(self) -> float: ...
+    @property
+    def fit(self) -> float: ...
+    @property
+    def smoothness(self) -> float: ...
+    @property
+    def determinant(self) -> float: ...
+    @property
+    def total(self) -> float: ...
 
 class PreparedCache:
     """
@@ -799,6 +900,21 @@ def nearest_map(
     aligned: bool = False,
     progress: Progress = None,
 ) -> InitialMap: ...
+def unsupervised_loss(
+    first: PreparedMesh,
+    second: PreparedMesh,
+    features: typing.Annotated[
+        collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]],
+        "FixedSize(2)",
+    ],
+    predicted: typing.Annotated[
+        collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 9]"]],
+        "FixedSize(2)",
+    ],
+    functions: typing.SupportsInt | typing.SupportsIndex,
+    options: UnsupervisedOptions,
+    progress: Progress = None,
+) -> UnsupervisedLoss: ...
 def uv_map(
     source: PreparedMesh,
     target: PreparedMesh,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "supple/geometry/surface_operators.h"
 
+#include "neighbours.h"
 #include "supple/geometry/jacobians.h"
 #include "supple/geometry/operators.h"
 
@@ -24,18 +25,7 @@ Points neighbour_normals(const Points& normals, const Faces& faces, const Corner
   Points sums = Points::Zero(faces.rows(), 3);
 #pragma omp parallel for schedule(static)
   for (Eigen::Index f = 0; f < faces.rows(); ++f) {
-    const auto face = faces.row(f);
-    for (int c = 0; c < 3; ++c) {
-      // The faces across the edge from this corner to the next: met at this corner only.
-      const int from = face[c], to = face[(c + 1) % 3];
-      for (int i = corners.first[from]; i < corners.first[from + 1]; ++i) {
-        const int other = corners.corner[i] / 3;
-        const auto its = faces.row(other);
-        if (other != f && (its[0] == to || its[1] == to || its[2] == to)) {
-          sums.row(f) += normals.row(other);
-        }
-      }
-    }
+    for_each_neighbour(faces, corners, f, [&](int other) { sums.row(f) += normals.row(other); });
   }
   return sums;
 }
