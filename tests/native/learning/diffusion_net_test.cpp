@@ -231,6 +231,16 @@ TEST(DiffusionNet, SlowTwoTriangulationsOfOneSurface) {
   EXPECT_GT(relative(found, on_the_sphere(at, regular.faces, expected, -other)), 0.5);
 }
 
+TEST(DiffusionNet, TheImaginaryDiagonalHasNoEffect) {
+  const zoo::Mesh mesh = egg_mesh();
+  const auto parameters = awake<double>();
+  auto other = parameters;
+  other.blocks[0].imaginary.diagonal().array() += 50.0;
+  EXPECT_LT(relative(features(mesh, other), features(mesh, parameters)), 1e-10);
+  other.blocks[0].imaginary(1, 2) += 50.0;
+  EXPECT_GT(relative(features(mesh, other), features(mesh, parameters)), 1e-2);
+}
+
 TEST(DiffusionNet, SameThreadsSameBytes) {
   const test::Threads threads(2);
   const test::FeatureSurface<float> surface(egg_mesh(), kFunctions);

@@ -53,8 +53,15 @@ TEST(DiffusionParameters, StartAsStated) {
   EXPECT_NE(parameters.tensors(), DiffusionParameters<double>::random({}, 4).tensors());
   for (const auto& tensor : parameters.named()) {
     const RowMatrix<double>& values = *tensor.values;
-    if (tensor.name.ends_with("bias") || tensor.name.ends_with("times")) {
+    if (tensor.name.ends_with("bias")) {
       EXPECT_TRUE(values.isZero(0.0)) << tensor.name;
+      continue;
+    }
+    if (tensor.name.ends_with("times")) {
+      EXPECT_GE(values.minCoeff(), 0.0) << tensor.name;
+      EXPECT_LT(values.minCoeff(), 0.002) << tensor.name;
+      EXPECT_GT(values.maxCoeff(), 0.018) << tensor.name;
+      EXPECT_LE(values.maxCoeff(), 0.02) << tensor.name;
       continue;
     }
     const double bound = std::sqrt(6.0 / static_cast<double>(values.rows() + values.cols()));
@@ -86,8 +93,7 @@ TEST(DiffusionAdam, MovesEveryTensorByItsRateAtFirst) {
 }
 
 TEST(DiffusionAdam, KeepsTimesAtZeroOrAbove) {
-  auto parameters = DiffusionParameters<double>::random(kSizes, 3),
-       gradient = DiffusionParameters<double>::zeros(kSizes);
+  auto parameters = DiffusionParameters<double>::zeros(kSizes), gradient = parameters;
   gradient.blocks[0].times << 1.0, -1.0, 1.0, -1.0, 0.0;
   DiffusionAdam<double> adam(kSizes);
   for (int step = 0; step < 3; ++step) {

@@ -55,9 +55,10 @@ struct DiffusionParameters {
     RowMatrix<Scalar> weight, bias;
   };
   struct Block {
-    RowMatrix<Scalar> times;            ///< 1 x width, >= 0, in units of area
-    RowMatrix<Scalar> real, imaginary;  ///< width x width, the parts of A
-    std::array<Layer, 3> layers;        ///< 3 width to width, then width to width twice
+    RowMatrix<Scalar> times;  ///< 1 x width, >= 0, in units of area
+    /// width x width, the parts of A; the diagonal of `imaginary` has no effect.
+    RowMatrix<Scalar> real, imaginary;
+    std::array<Layer, 3> layers;  ///< 3 width to width, then width to width twice
   };
   Layer first;  ///< inputs to width
   std::vector<Block> blocks;
@@ -65,7 +66,10 @@ struct DiffusionParameters {
 
   /// Errors: `bad_option` for sizes below 1 (blocks: below 0).
   static DiffusionParameters zeros(const DiffusionSizes& sizes);
-  /// Glorot uniform weights; zero biases and, as the authors have it, zero times.
+  /// Glorot uniform weights, zero biases, times uniform in [0, 0.02]. The authors start at time 0;
+  /// on a surface of area 1, with 128 eigenfunctions and wave kernels in, the gradients are then so
+  /// large that 9 of 10 gradient features of the last block are at the ends of tanh (here: 1 in
+  /// 70).
   static DiffusionParameters random(const DiffusionSizes& sizes, uint64_t seed);
   /// Errors: `model_file` where a tensor is missing, has another shape, is not finite, or a time is
   /// negative; those of `zeros`.

@@ -103,7 +103,12 @@ RowMatrix<Scalar> block_backward(const typename DiffusionParameters<Scalar>::Blo
   products_backward<Scalar>(trace.gradients, trace.mapped, trace.products, grad.rightCols(width),
                             grad_gradients, grad_mapped);
   gradient.real += transposed_times(trace.gradients, grad_mapped);
-  gradient.imaginary += transposed_times(quarter_turn(trace.gradients, Scalar(1)), grad_mapped);
+  // A number and i times it are at right angles: the diagonal has no effect. Rounding would leave
+  // it a slope, and Adam takes steps of full length along any.
+  RowMatrix<Scalar> grad_imaginary =
+      transposed_times(quarter_turn(trace.gradients, Scalar(1)), grad_mapped);
+  grad_imaginary.diagonal().setZero();
+  gradient.imaginary += grad_imaginary;
   grad_gradients += times<Scalar>(grad_mapped, RowMatrix<Scalar>(block.real.transpose()));
   grad_gradients += times<Scalar>(quarter_turn(grad_mapped, Scalar(-1)),
                                   RowMatrix<Scalar>(block.imaginary.transpose()));

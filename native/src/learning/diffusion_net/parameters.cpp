@@ -9,6 +9,8 @@
 namespace supple {
 namespace {
 
+constexpr double kLongest = 0.02;  // of the times a network starts with
+
 // Calls visit(name, tensor) for each, constant or not.
 template <class Parameters, class Visit>
 void over_tensors(Parameters& parameters, const Visit& visit) {
@@ -81,6 +83,8 @@ DiffusionParameters<Scalar> DiffusionParameters<Scalar>::random(const DiffusionS
   };
   fill(result.first.weight);
   for (Block& block : result.blocks) {
+    fill_uniform(generator, kLongest / 2.0, block.times);
+    block.times.array() += static_cast<Scalar>(kLongest / 2.0);
     fill(block.real);
     fill(block.imaginary);
     for (Layer& layer : block.layers) {
