@@ -6,7 +6,6 @@
 #include <array>
 #include <cstdint>
 #include <map>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -68,8 +67,8 @@ struct DiffusionParameters {
   static DiffusionParameters zeros(const DiffusionSizes& sizes);
   /// Glorot uniform weights, zero biases, times uniform in [0, 0.02]. The authors start at time 0;
   /// on a surface of area 1, with 128 eigenfunctions and wave kernels in, the gradients are then so
-  /// large that 9 of 10 gradient features of the last block are at the ends of tanh (here: 1 in
-  /// 70).
+  /// large that 9 of 10 gradient features of the last block are at the ends of tanh (so: 1 in
+  /// 100).
   static DiffusionParameters random(const DiffusionSizes& sizes, uint64_t seed);
   /// Errors: `model_file` where a tensor is missing, has another shape, is not finite, or a time is
   /// negative; those of `zeros`.

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cmath>
 #include <random>
+#include <span>
 
-#include "../tensors.h"
+#include "learning/tensors.h"
 #include "supple/core/error.h"
 #include "supple/learning/diffusion_net.h"
 
