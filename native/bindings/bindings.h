@@ -22,6 +22,7 @@ void bind_core(py::module_& module);
 void bind_geometry(py::module_& module);
 void bind_spectral(py::module_& module);
 void bind_learning(py::module_& module);
+void bind_features(py::module_& module);
 void bind_cache(py::module_& module);
 void bind_tasks(py::module_& module);
 void bind_map_metrics(py::module_& module);

@@ -8,6 +8,7 @@ PYBIND11_MODULE(_native, module) {
   supple::bindings::bind_geometry(module);
   supple::bindings::bind_spectral(module);
   supple::bindings::bind_learning(module);
+  supple::bindings::bind_features(module);
   supple::bindings::bind_cache(module);
   supple::bindings::bind_tasks(module);
   supple::bindings::bind_inbetween(module);

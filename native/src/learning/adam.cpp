@@ -3,22 +3,36 @@
 
 #include <cmath>
 
+#include "supple/core/error.h"
+
 namespace supple {
 namespace {
 
 constexpr double kBeta1 = 0.9, kBeta2 = 0.999, kEpsilon = 1e-8;
 
-template <class Gradient, class Values>
-void update(const Gradient& gradient, double rate, int steps, Values& mean, Values& square,
-            Values& values) {
-  using Scalar = typename Values::Scalar;
-  const auto b1 = static_cast<Scalar>(kBeta1), b2 = static_cast<Scalar>(kBeta2);
-  const auto correct1 = static_cast<Scalar>(1.0 / (1.0 - std::pow(kBeta1, steps)));
-  const auto correct2 = static_cast<Scalar>(1.0 / (1.0 - std::pow(kBeta2, steps)));
-  mean.array() = b1 * mean.array() + (Scalar(1) - b1) * gradient.array();
-  square.array() = b2 * square.array() + (Scalar(1) - b2) * gradient.array().square();
-  values.array() -= static_cast<Scalar>(rate) * (correct1 * mean.array()) /
-                    ((correct2 * square.array()).sqrt() + static_cast<Scalar>(kEpsilon));
+template <class Matrix>
+auto numbers(Matrix& matrix) {
+  return std::span(matrix.data(), static_cast<size_t>(matrix.size()));
+}
+
+// The numbers of every layer, its weights before its bias.
+template <class Number, class Parameters>
+std::vector<std::span<Number>> layers(Parameters& parameters) {
+  std::vector<std::span<Number>> result;
+  for (size_t l = 0; l < parameters.weights.size(); ++l) {
+    result.push_back(numbers(parameters.weights[l]));
+    result.push_back(numbers(parameters.biases[l]));
+  }
+  return result;
+}
+
+std::vector<Eigen::Index> layer_counts(const LayerSizes& sizes) {
+  std::vector<Eigen::Index> counts;
+  for (int l = 0; l < sizes.count(); ++l) {
+    counts.push_back(Eigen::Index(sizes.rows(l)) * sizes.cols(l));
+    counts.push_back(sizes.cols(l));
+  }
+  return counts;
 }
 
 }  // namespace
@@ -28,20 +42,46 @@ double decayed_learning_rate(double first, double last, int step, int total) {
 }
 
 template <class Scalar>
-Adam<Scalar>::Adam(const LayerSizes& sizes)
-    : mean_(LayerParameters<Scalar>::zeros(sizes)),
-      square_(LayerParameters<Scalar>::zeros(sizes)) {}
+Adam<Scalar>::Adam(const std::vector<Eigen::Index>& counts) {
+  for (const Eigen::Index count : counts) {
+    mean_.push_back(Array::Zero(count));
+    square_.push_back(Array::Zero(count));
+  }
+}
+
+template <class Scalar>
+Adam<Scalar>::Adam(const LayerSizes& sizes) : Adam(layer_counts(sizes)) {}
+
+template <class Scalar>
+void Adam<Scalar>::step(const std::vector<std::span<const Scalar>>& gradient, double learning_rate,
+                        const std::vector<std::span<Scalar>>& values) {
+  bool fits = gradient.size() == mean_.size() && values.size() == mean_.size();
+  for (size_t t = 0; fits && t < mean_.size(); ++t) {
+    const auto size = static_cast<size_t>(mean_[t].size());
+    fits = gradient[t].size() == size && values[t].size() == size;
+  }
+  if (!fits) {
+    throw Error(ErrorCode::wrong_shape,
+                "The gradient or the parameters are not of the sizes this Adam was made for.");
+  }
+  ++steps_;
+  const auto b1 = static_cast<Scalar>(kBeta1), b2 = static_cast<Scalar>(kBeta2);
+  const auto correct1 = static_cast<Scalar>(1.0 / (1.0 - std::pow(kBeta1, steps_)));
+  const auto correct2 = static_cast<Scalar>(1.0 / (1.0 - std::pow(kBeta2, steps_)));
+  for (size_t t = 0; t < mean_.size(); ++t) {
+    const Eigen::Map<const Array> g(gradient[t].data(), mean_[t].size());
+    Eigen::Map<Array> x(values[t].data(), mean_[t].size());
+    mean_[t] = b1 * mean_[t] + (Scalar(1) - b1) * g;
+    square_[t] = b2 * square_[t] + (Scalar(1) - b2) * g.square();
+    x -= static_cast<Scalar>(learning_rate) * (correct1 * mean_[t]) /
+         ((correct2 * square_[t]).sqrt() + static_cast<Scalar>(kEpsilon));
+  }
+}
 
 template <class Scalar>
 void Adam<Scalar>::step(const LayerParameters<Scalar>& gradient, double learning_rate,
                         LayerParameters<Scalar>& parameters) {
-  ++steps_;
-  for (size_t l = 0; l < gradient.weights.size(); ++l) {
-    update(gradient.weights[l], learning_rate, steps_, mean_.weights[l], square_.weights[l],
-           parameters.weights[l]);
-    update(gradient.biases[l], learning_rate, steps_, mean_.biases[l], square_.biases[l],
-           parameters.biases[l]);
-  }
+  step(layers<const Scalar>(gradient), learning_rate, layers<Scalar>(parameters));
 }
 
 template class Adam<float>;

@@ -7,34 +7,12 @@
 #include "supple/core/dense.h"
 #include "supple/core/error.h"
 #include "supple/geometry/operators.h"
+#include "tensors.h"
 
 namespace supple {
 namespace {
 
 using equivariant::kScaleCount;
-
-template <class Scalar>
-RowMatrix<Scalar> read_tensor(const std::map<std::string, RowMatrix<float>>& tensors,
-                              const std::string& name, Eigen::Index rows, Eigen::Index cols) {
-  const auto found = tensors.find(name);
-  if (found == tensors.end()) {
-    throw Error(ErrorCode::model_file,
-                "The weights have no tensor '" + name +
-                    "'. They are not a Supple network of this architecture.");
-  }
-  const RowMatrix<float>& value = found->second;
-  if (value.rows() != rows || value.cols() != cols) {
-    throw Error(ErrorCode::model_file,
-                "The weights' tensor '" + name + "' is " + std::to_string(value.rows()) + " x " +
-                    std::to_string(value.cols()) + ", not " + std::to_string(rows) + " x " +
-                    std::to_string(cols) + ". They belong to another architecture.");
-  }
-  if (!value.allFinite()) {
-    throw Error(ErrorCode::model_file,
-                "The weights' tensor '" + name + "' has numbers that are not finite.");
-  }
-  return value.template cast<Scalar>();
-}
 
 }  // namespace
 

@@ -7,6 +7,7 @@
 #include "supple/core/dense.h"
 #include "supple/core/error.h"
 #include "supple/learning/silu.h"
+#include "tensors.h"
 
 namespace supple {
 template <class Scalar>
@@ -27,11 +28,7 @@ LayerParameters<Scalar> LayerParameters<Scalar>::random(const LayerSizes& sizes,
   for (int l = 0; l < sizes.count(); ++l) {
     const double gain = l == sizes.count() - 1 ? last_gain : 1.0;
     const double bound = gain * std::sqrt(6.0 / (sizes.rows(l) + sizes.cols(l)));
-    for (Eigen::Index i = 0; i < result.weights[l].size(); ++i) {
-      // 53 random bits by hand: std::uniform_real_distribution differs between libraries.
-      const double unit = static_cast<double>(generator() >> 11) * 0x1.0p-53;
-      result.weights[l].data()[i] = static_cast<Scalar>(bound * (2.0 * unit - 1.0));
-    }
+    fill_uniform(generator, bound, result.weights[l]);
   }
   return result;
 }

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <span>
+#include <vector>
+
 #include "supple/learning/spectral_mlp.h"
 
 namespace supple {
@@ -13,12 +16,18 @@ double decayed_learning_rate(double first, double last, int step, int total);
 template <class Scalar>
 class Adam {
  public:
+  /// For tensors of so many numbers each.
+  explicit Adam(const std::vector<Eigen::Index>& counts);
   explicit Adam(const LayerSizes& sizes);
+  /// gradient, values: a span for each tensor, in the constructor's order. Errors: `wrong_shape`.
+  void step(const std::vector<std::span<const Scalar>>& gradient, double learning_rate,
+            const std::vector<std::span<Scalar>>& values);
   void step(const LayerParameters<Scalar>& gradient, double learning_rate,
             LayerParameters<Scalar>& parameters);
 
  private:
-  LayerParameters<Scalar> mean_, square_;
+  using Array = Eigen::Array<Scalar, Eigen::Dynamic, 1>;
+  std::vector<Array> mean_, square_;  // of the gradient, one a tensor
   int steps_ = 0;
 };
 
