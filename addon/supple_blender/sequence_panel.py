@@ -39,7 +39,6 @@ class SUPPLE_PT_sequence(Sidebar, bpy.types.Panel):
         row.prop(body, "first")
         row.prop(body, "last")
         row = column.row(align=True)
-        row.label(text="Ease")
         row.prop(body, "ease_in", text="In")
         row.prop(body, "ease_out", text="Out")
         self._draw_keys(layout, context, obj)
