@@ -289,7 +289,6 @@ def test_as_shape_keys(bar, tmp_path):
     before = moving.every_frame(bar)
     key_head()
     cached = bake(bar, tmp_path / "shot.pc2")
-    bpy.ops.supple.sequence_remove()
     bar.supple_sequence.output = "KEYS"
     assert bpy.ops.supple.sequence_bake() == {"FINISHED"}
     keyed = moving.every_frame(bar)

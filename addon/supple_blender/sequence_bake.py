@@ -224,7 +224,11 @@ def to_output(context, obj, stages, overwrite=False, pieces=()):
     wanted = range_of(obj)
     if obj.supple_sequence.output == "KEYS":
         shape_key_frames.require_free(obj, SEQUENCE_KEYS, wanted.frames, overwrite)
-        return (yield from _to_keys(context, obj, wanted, stages))
+        name = obj.name
+        baked = yield from _to_keys(context, obj, wanted, stages)
+        # A cache of before would be shown in their place.
+        sequence_output.detach_cache(bpy.data.objects[name])
+        return baked
     sequence_output.require_free(obj)
     path = file_of(obj)
     require_free_file(obj, path, overwrite)

@@ -142,6 +142,11 @@ def detach(obj, name=RESULT):
         raise UserError(f"{obj.name}: there is no baked sequence to remove.")
     for key in [key.name for key in _keys(obj, name)]:
         shape_key_frames.remove(obj, key)
+    return detach_cache(obj, name)
+
+
+def detach_cache(obj, name=RESULT):
+    """As `detach`, of the modifier alone, if there is one."""
     modifier = obj.modifiers.get(name)
     if modifier is None:
         return None
