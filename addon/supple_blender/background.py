@@ -53,7 +53,52 @@ class Worker:
         return self._result
 
 
-class LongOperator:
+class ModalWork:
+    """Mixin for operators that work while the window lives: its timer, status line and reports."""
+
+    _timer = None
+
+    def _require_idle(self):
+        if running is not None:
+            raise UserError("Supple is at work already. Wait for it, or press Esc.")
+
+    def _begin(self, context, stages, seconds):
+        """Become modal: `modal` is called every so many seconds."""
+        global running
+        running = stages
+        manager = context.window_manager
+        manager.progress_begin(0, 100)
+        self._timer = manager.event_timer_add(seconds, window=context.window)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def _say(self, level, message):
+        self.report({level}, message)
+        return {"FINISHED"}
+
+    def _fail(self, error):
+        self.report({"ERROR"}, str(error))
+        return {"CANCELLED"}
+
+    def _show(self, context, stages, name, keys):
+        """Show how far it is, and what `keys` do."""
+        keys = "stopping" if stages.cancelled else keys
+        parts = [f"{name}: {stages.doing()}", stages.left(), keys]
+        context.window_manager.progress_update(int(100 * stages.fraction))
+        context.workspace.status_text_set("   ".join(part for part in parts if part))
+        redraw_sidebars(context)
+
+    def _leave(self, context):
+        global running
+        running = None
+        manager = context.window_manager
+        manager.event_timer_remove(self._timer)
+        manager.progress_end()
+        context.workspace.status_text_set(None)
+        redraw_sidebars(context)
+
+
+class LongOperator(ModalWork):
     """Mixin for operators. Subclasses define `collect`, `compute` and `write`.
 
     collect(context) -> inputs; compute(inputs, stages) -> result; write(context, inputs, result) ->
@@ -62,7 +107,6 @@ class LongOperator:
 
     _worker = None
     _stages = None
-    _timer = None
     _inputs = None
 
     def execute(self, context):
@@ -75,20 +119,14 @@ class LongOperator:
     def invoke(self, context, event):
         if bpy.app.background or context.window is None:
             return self.execute(context)
-        global running
-        if running is not None:
-            return self._fail(UserError("Supple is at work already. Wait for it, or press Esc."))
         try:
+            self._require_idle()
             self._inputs = inputs = self.collect(context)
-            self._stages = running = Stages()
         except UserError as error:
             return self._fail(error)
+        self._stages = Stages()
         self._worker = Worker(lambda stages: self.compute(inputs, stages), self._stages)
-        manager = context.window_manager
-        manager.progress_begin(0, 100)
-        self._timer = manager.event_timer_add(TICK_SECONDS, window=context.window)
-        manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
+        return self._begin(context, self._stages, TICK_SECONDS)
 
     def modal(self, context, event):
         if event.type == "ESC" and event.value == "PRESS":
@@ -98,7 +136,7 @@ class LongOperator:
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
         if self._worker.is_alive():
-            self._show(context)
+            self._show(context, self._stages, self._inputs.name, "Esc cancels")
             return {"RUNNING_MODAL"}
         self._leave(context)
         try:
@@ -116,30 +154,7 @@ class LongOperator:
         self._leave(context)
 
     def _finish(self, context, inputs, result):
-        level, message = self.write(context, inputs, result)
-        self.report({level}, message)
-        return {"FINISHED"}
-
-    def _fail(self, error):
-        self.report({"ERROR"}, str(error))
-        return {"CANCELLED"}
-
-    def _show(self, context):
-        stages = self._stages
-        esc = "stopping" if stages.cancelled else "Esc cancels"
-        parts = [f"{self._inputs.name}: {stages.doing()}", stages.left(), esc]
-        context.window_manager.progress_update(int(100 * stages.fraction))
-        context.workspace.status_text_set("   ".join(part for part in parts if part))
-        redraw_sidebars(context)
-
-    def _leave(self, context):
-        global running
-        running = None
-        manager = context.window_manager
-        manager.event_timer_remove(self._timer)
-        manager.progress_end()
-        context.workspace.status_text_set(None)
-        redraw_sidebars(context)
+        return self._say(*self.write(context, inputs, result))
 
 
 def redraw_sidebars(context):

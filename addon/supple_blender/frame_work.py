@@ -30,21 +30,20 @@ def run(work):
             concurrent.futures.wait([future])
 
 
-class FrameOperator:
+class FrameOperator(background.ModalWork):
     """Mixin for operators. Subclasses define `start` and `write`.
 
-    start(context, stages) -> (name of the object, generator); stages(context) -> FrameStages;
-    write(context, result) -> (level, message), with what the generator returned. `stopped` is the
-    message after Esc. All may raise UserError.
+    start(context) -> (name of the object, its FrameStages, generator); write(context, result) ->
+    (level, message), with what the generator returned. `stopped` is the message after Esc. Both may
+    raise UserError.
     """
 
     stopped = "cancelled, nothing was changed"
-    _work = _stages = _timer = _name = None
+    _name = _stages = _work = _waits = _result = None
 
     def execute(self, context):
         try:
-            self._stages = self.stages(context)
-            self._name, work = self.start(context, self._stages)
+            self._name, self._stages, work = self.start(context)
             return self._finish(context, run(work))
         except UserError as error:
             return self._fail(error)
@@ -52,19 +51,12 @@ class FrameOperator:
     def invoke(self, context, event):
         if bpy.app.background or context.window is None:
             return self.execute(context)
-        if background.running is not None:
-            return self._fail(UserError("Supple is at work already. Wait for it, or press Esc."))
         try:
-            self._stages = self.stages(context)
-            self._name, self._work = self.start(context, self._stages)
+            self._require_idle()
+            self._name, self._stages, self._work = self.start(context)
         except UserError as error:
             return self._fail(error)
-        background.running = self._stages
-        manager = context.window_manager
-        manager.progress_begin(0, 100)
-        self._timer = manager.event_timer_add(TICK_SECONDS, window=context.window)
-        manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
+        return self._begin(context, self._stages, TICK_SECONDS)
 
     def modal(self, context, event):
         stages = self._stages
@@ -73,14 +65,14 @@ class FrameOperator:
             stages.paused = False
         if event.type == "P" and event.value == "PRESS" and not stages.cancelled:
             stages.paused = not stages.paused
-            self._show(context)
+            self._show_frames(context)
         if event.type in background.NAVIGATION:
             return {"PASS_THROUGH"}
         if event.type != "TIMER" or stages.paused:
             return {"RUNNING_MODAL"}
         try:
             if not self._advance():
-                self._show(context)
+                self._show_frames(context)
                 return {"RUNNING_MODAL"}
             self._leave(context)
             return self._finish(context, self._result)
@@ -115,29 +107,9 @@ class FrameOperator:
                 return True
         return False
 
-    _waits = _result = None
-
     def _finish(self, context, result):
-        level, message = self.write(context, result)
-        self.report({level}, message)
-        return {"FINISHED"}
+        return self._say(*self.write(context, result))
 
-    def _fail(self, error):
-        self.report({"ERROR"}, str(error))
-        return {"CANCELLED"}
-
-    def _show(self, context):
-        stages = self._stages
-        keys = "P goes on, Esc stops" if stages.paused else "P pauses, Esc stops"
-        keys = "stopping" if stages.cancelled else keys
-        parts = [f"{self._name}: {stages.doing()}", stages.left(), keys]
-        context.window_manager.progress_update(int(100 * stages.fraction))
-        context.workspace.status_text_set("   ".join(part for part in parts if part))
-        background.redraw_sidebars(context)
-
-    def _leave(self, context):
-        background.running = None
-        context.window_manager.event_timer_remove(self._timer)
-        context.window_manager.progress_end()
-        context.workspace.status_text_set(None)
-        background.redraw_sidebars(context)
+    def _show_frames(self, context):
+        keys = "P goes on, Esc stops" if self._stages.paused else "P pauses, Esc stops"
+        self._show(context, self._stages, self._name, keys)

@@ -13,7 +13,6 @@ from . import (
     handles,
     inbetween,
     mesh_data,
-    native,
     sequence_bake,
     sequence_output,
     shape_key_frames,
@@ -65,15 +64,8 @@ def to_output(context, obj, inputs, stages, overwrite=False):
         with tempfile.TemporaryDirectory(prefix="supple-") as folder:
             path = Path(folder) / "frames.pc2"
             yield from _written(inputs, path, stages)
-            reader = native.supple().PointCacheReader(path)
             yield from shape_key_frames.write(
-                context,
-                obj,
-                INBETWEEN_KEYS,
-                inputs.frames,
-                lambda frame: reader.read(frame - inputs.frames[0]),
-                stages,
-                bare=True,
+                context, obj, INBETWEEN_KEYS, inputs.frames, path, stages, bare=True
             )
         return "as shape keys"
     sequence_output.require_free(obj, INBETWEEN)

@@ -244,15 +244,7 @@ def _to_keys(context, obj, wanted, stages):
     with tempfile.TemporaryDirectory(prefix="supple-") as folder:
         path = Path(folder) / "frames.pc2"
         baked = yield from bake(context, obj, wanted, path, stages)
-        reader = native.supple().PointCacheReader(path)
-        yield from shape_key_frames.write(
-            context,
-            obj,
-            SEQUENCE_KEYS,
-            wanted.frames,
-            lambda frame: reader.read(frame - wanted.first),
-            stages,
-        )
+        yield from shape_key_frames.write(context, obj, SEQUENCE_KEYS, wanted.frames, path, stages)
     return replace(baked, path=None)
 
 

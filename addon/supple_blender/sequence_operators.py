@@ -28,14 +28,12 @@ class SUPPLE_OT_sequence_follow(FrameOperator, bpy.types.Operator):
     bl_label = "Handles Follow"
     bl_options = {"REGISTER", "UNDO"}
 
-    def stages(self, context):
-        return FrameStages(_frames(context), "Following")
-
-    def start(self, context, stages):
+    def start(self, context):
         obj = active_body(context)
         sequence_preview.end()
         range = sequence_bake.range_of(obj)
-        return obj.name, sequence_frames.collect(context, obj, range, stages)
+        stages = FrameStages(len(range.frames), "Following")
+        return obj.name, stages, sequence_frames.collect(context, obj, range, stages)
 
     def write(self, context, result):
         obj = bpy.data.objects[self._name]
@@ -43,11 +41,6 @@ class SUPPLE_OT_sequence_follow(FrameOperator, bpy.types.Operator):
         sequence_frames.attach(context, obj, range, result)
         handles = count(len(result), "handle follows", "handles follow")
         return "INFO", f"{obj.name}: {handles} the mesh, frames {range.first} to {range.last}"
-
-
-def _frames(context):
-    body = active_body(context).supple_sequence
-    return max(1, body.last - body.first + 1)
 
 
 class SUPPLE_OT_sequence_key(HandleOperator, bpy.types.Operator):
@@ -111,17 +104,14 @@ class SUPPLE_OT_sequence_bake(FrameOperator, bpy.types.Operator):
     )
     stopped = "stopped; the frames that are done are kept, and Bake goes on from there"
 
-    def stages(self, context):
-        return FrameStages(_frames(context), "Baking")
-
-    def start(self, context, stages):
+    def start(self, context):
         obj = active_body(context)
         live.end(keep=True)
         sequence_preview.end()
         if self.file:
             obj.supple_sequence.file = self.file
-        work = sequence_bake.to_output(context, obj, stages, self.overwrite)
-        return obj.name, work
+        stages = FrameStages(len(sequence_bake.range_of(obj).frames))
+        return obj.name, stages, sequence_bake.to_output(context, obj, stages, self.overwrite)
 
     def write(self, context, result):
         return "INFO", f"{self._name}: {sequence_bake.sentence(result)}"
@@ -177,10 +167,7 @@ class SUPPLE_OT_inbetween(FrameOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    def stages(self, context):
-        return FrameStages(_frames(context), "Filling")
-
-    def start(self, context, stages):
+    def start(self, context):
         obj = active_body(context)
         live.end(keep=True)
         body = obj.supple_sequence
@@ -190,7 +177,9 @@ class SUPPLE_OT_inbetween(FrameOperator, bpy.types.Operator):
         if self.frames:
             times = _whole_numbers(obj, self.frames)
         inputs = inbetween_bake.collect(context, obj, keys, times)
-        return obj.name, inbetween_bake.to_output(context, obj, inputs, stages, self.overwrite)
+        stages = FrameStages(len(inputs.frames), "Filling")
+        work = inbetween_bake.to_output(context, obj, inputs, stages, self.overwrite)
+        return obj.name, stages, work
 
     def write(self, context, result):
         return "INFO", f"{self._name}: in-betweens {result}"

@@ -9,7 +9,7 @@ made under other names and take their places when all are done: a failure leaves
 import bpy
 import numpy as np
 
-from . import compat, mesh_data, shape_keys
+from . import compat, mesh_data, native, shape_keys
 from .errors import UserError
 from .modifier_stack import MovingMesh, recorded_keys
 
@@ -38,9 +38,9 @@ def require_free(obj, prefix, frames, overwrite=False):
         shape_keys.require_free(obj, name, overwrite)
 
 
-def write(context, obj, prefix, frames, read, stages, bare=False):
-    """Write a key for each frame; a generator for `frame_work`. read(frame) -> positions (n, 3);
-    bare: as they are before the modifiers, else after them.
+def write(context, obj, prefix, frames, path, stages, bare=False):
+    """Write a key for each frame; a generator for `frame_work`. path: a PC2 file of what they are
+    to show, from the first on; bare: before the modifiers, else after them.
 
     Keys of the same prefix that Supple wrote before go. Raises UserError where modifiers can't be
     taken back, CancelledError; then obj is as it was.
@@ -48,12 +48,13 @@ def write(context, obj, prefix, frames, read, stages, bare=False):
     mesh_data.leave_mode(obj)
     had_keys = obj.data.shape_keys is not None
     new = names(f"{prefix} ~", frames)
+    cache = native.supple().PointCacheReader(path)
     try:
         with MovingMesh(context, obj, bare=bare) as moving:
             size = float(np.linalg.norm(np.ptp(mesh_data.rest_positions(obj), axis=0)))
             for done, (frame, name) in enumerate(zip(frames, new, strict=True)):
                 moving.go_to(frame)
-                error = _fit_key(context, moving, name, frame, read(frame)) / size
+                error = _fit_key(context, moving, name, frame, cache.read(done)) / size
                 if error > TOLERANCE:
                     raise UserError(
                         f"{obj.name}: at frame {frame} a shape key can't show the result: its "
