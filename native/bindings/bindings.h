@@ -33,5 +33,6 @@ void bind_transfer(py::module_& module);
 void bind_sequence(py::module_& module);
 void bind_point_cache(py::module_& module);
 void bind_unsupervised(py::module_& module);
+void bind_matching(py::module_& module);
 
 }  // namespace supple::bindings

@@ -19,4 +19,5 @@ PYBIND11_MODULE(_native, module) {
   supple::bindings::bind_sequence(module);
   supple::bindings::bind_point_cache(module);
   supple::bindings::bind_unsupervised(module);
+  supple::bindings::bind_matching(module);
 }

@@ -2,6 +2,7 @@
 #include "supple/learning/adam.h"
 
 #include <cmath>
+#include <utility>
 
 #include "supple/core/error.h"
 
@@ -44,8 +45,8 @@ double decayed_learning_rate(double first, double last, int step, int total) {
 template <class Scalar>
 Adam<Scalar>::Adam(const std::vector<Eigen::Index>& counts) {
   for (const Eigen::Index count : counts) {
-    mean_.push_back(Array::Zero(count));
-    square_.push_back(Array::Zero(count));
+    state_.mean.push_back(RowMatrix<Scalar>::Zero(1, count));
+    state_.square.push_back(RowMatrix<Scalar>::Zero(1, count));
   }
 }
 
@@ -53,28 +54,46 @@ template <class Scalar>
 Adam<Scalar>::Adam(const LayerSizes& sizes) : Adam(layer_counts(sizes)) {}
 
 template <class Scalar>
+void Adam<Scalar>::restore(State state) {
+  const auto fits = [&](const std::vector<RowMatrix<Scalar>>& given) {
+    bool same = given.size() == state_.mean.size();
+    for (size_t t = 0; same && t < given.size(); ++t) {
+      same = given[t].rows() == 1 && given[t].cols() == state_.mean[t].cols();
+    }
+    return same;
+  };
+  if (!fits(state.mean) || !fits(state.square) || state.steps < 0) {
+    throw Error(ErrorCode::wrong_shape, "The state of an Adam for other tensors was given.");
+  }
+  state_ = std::move(state);
+}
+
+template <class Scalar>
 void Adam<Scalar>::step(const std::vector<std::span<const Scalar>>& gradient, double learning_rate,
                         const std::vector<std::span<Scalar>>& values) {
-  bool fits = gradient.size() == mean_.size() && values.size() == mean_.size();
-  for (size_t t = 0; fits && t < mean_.size(); ++t) {
-    const auto size = static_cast<size_t>(mean_[t].size());
+  auto& [mean, square, steps] = state_;
+  bool fits = gradient.size() == mean.size() && values.size() == mean.size();
+  for (size_t t = 0; fits && t < mean.size(); ++t) {
+    const auto size = static_cast<size_t>(mean[t].size());
     fits = gradient[t].size() == size && values[t].size() == size;
   }
   if (!fits) {
     throw Error(ErrorCode::wrong_shape,
                 "The gradient or the parameters are not of the sizes this Adam was made for.");
   }
-  ++steps_;
+  ++steps;
   const auto b1 = static_cast<Scalar>(kBeta1), b2 = static_cast<Scalar>(kBeta2);
-  const auto correct1 = static_cast<Scalar>(1.0 / (1.0 - std::pow(kBeta1, steps_)));
-  const auto correct2 = static_cast<Scalar>(1.0 / (1.0 - std::pow(kBeta2, steps_)));
-  for (size_t t = 0; t < mean_.size(); ++t) {
-    const Eigen::Map<const Array> g(gradient[t].data(), mean_[t].size());
-    Eigen::Map<Array> x(values[t].data(), mean_[t].size());
-    mean_[t] = b1 * mean_[t] + (Scalar(1) - b1) * g;
-    square_[t] = b2 * square_[t] + (Scalar(1) - b2) * g.square();
-    x -= static_cast<Scalar>(learning_rate) * (correct1 * mean_[t]) /
-         ((correct2 * square_[t]).sqrt() + static_cast<Scalar>(kEpsilon));
+  const auto correct1 = static_cast<Scalar>(1.0 / (1.0 - std::pow(kBeta1, steps)));
+  const auto correct2 = static_cast<Scalar>(1.0 / (1.0 - std::pow(kBeta2, steps)));
+  for (size_t t = 0; t < mean.size(); ++t) {
+    using Array = Eigen::Array<Scalar, 1, Eigen::Dynamic>;
+    const Eigen::Map<const Array> g(gradient[t].data(), mean[t].size());
+    Eigen::Map<Array> x(values[t].data(), mean[t].size());
+    auto m = mean[t].row(0).array(), v = square[t].row(0).array();
+    m = b1 * m + (Scalar(1) - b1) * g;
+    v = b2 * v + (Scalar(1) - b2) * g.square();
+    x -= static_cast<Scalar>(learning_rate) * (correct1 * m) /
+         ((correct2 * v).sqrt() + static_cast<Scalar>(kEpsilon));
   }
 }
 

@@ -25,10 +25,17 @@ class Adam {
   void step(const LayerParameters<Scalar>& gradient, double learning_rate,
             LayerParameters<Scalar>& parameters);
 
+  /// All that the next step depends on besides its arguments.
+  struct State {
+    std::vector<RowMatrix<Scalar>> mean, square;  ///< of the gradient, 1 x numbers for each tensor
+    int steps = 0;
+  };
+  const State& state() const { return state_; }
+  /// Goes on from a state that `state` returned. Errors: `wrong_shape` for that of other tensors.
+  void restore(State state);
+
  private:
-  using Array = Eigen::Array<Scalar, Eigen::Dynamic, 1>;
-  std::vector<Array> mean_, square_;  // of the gradient, one a tensor
-  int steps_ = 0;
+  State state_;
 };
 
 }  // namespace supple

@@ -148,6 +148,8 @@ class DiffusionAdam {
   /// Errors: `wrong_shape` where either is of other sizes.
   void step(const DiffusionParameters<Scalar>& gradient, double learning_rate,
             DiffusionParameters<Scalar>& parameters);
+  const typename Adam<Scalar>::State& state() const { return adam_.state(); }
+  void restore(typename Adam<Scalar>::State state) { adam_.restore(std::move(state)); }
 
  private:
   Adam<Scalar> adam_;

@@ -11,6 +11,8 @@ struct JacobianWeights {
   double fit = 1.0;
   double smoothness = 20.0;
   double determinant = 10.0;
+
+  bool any() const { return fit != 0.0 || smoothness != 0.0 || determinant != 0.0; }
 };
 
 /// The three terms before weighting, and their weighted sum.

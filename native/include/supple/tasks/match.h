@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Matching two meshes with no map at all: features that are learned for the pair, a deformation
+// that is learned with them, and a refined map. Source: the paper, section 4.4, and its zero-shot
+// experiment (section 5.2).
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "supple/core/progress.h"
+#include "supple/learning/joint_trainer.h"
+#include "supple/tasks/initial_map.h"
+#include "supple/tasks/prepared_mesh.h"
+#include "supple/tasks/refine.h"
+
+namespace supple {
+
+using MatchNetworks = JointNetworks<float>;
+
+/// What training and matching need of a prepared mesh, which must outlive it.
+/// functions: of functional maps and signals. Errors: those of `JointSurface`.
+std::shared_ptr<const JointSurface<float>> joint_surface(const PreparedMesh& mesh,
+                                                         const MatchNetworks& networks,
+                                                         int functions);
+
+/// Rough maps of two meshes both ways, found without features.
+struct GuideMaps {
+  std::array<Eigen::VectorXi, 2> point_maps;  ///< of the callers' vertices
+  std::array<RowMatrix<double>, 2> maps;      ///< as of `Guide`
+  /// Mean distance between a surface vertex and where the way there and back ends, both ways
+  /// together, in roots of the area. Wrong maps are found independently and rarely agree.
+  double round_trip = 0.0;
+};
+/// `automatic_map` both ways. functions: rows and columns wanted of the functional maps; those of
+/// `joint_surface`. Errors: those of `automatic_map`.
+GuideMaps guide_maps(const PreparedMesh& first, const PreparedMesh& second, int functions,
+                     ProgressRange progress = {});
+
+struct MatchOptions {
+  /// Adaptation to the pair: 2 steps an epoch, without guides. 0 epochs: the features as they are.
+  JointTrainOptions training;
+  int functions = 80;  ///< of functional maps and the signal, >= 1
+  /// Also look for a map without features (`automatic_map`); the more plausible one is refined.
+  bool automatic = true;
+  RefineOptions refine;
+
+  MatchOptions() {
+    training.epochs = 15;
+    training.guided_epochs = 0;
+    training.feature_learning_rate = {3e-4, 1e-4};
+  }
+};
+
+struct MatchResult {
+  InitialMap initial;      ///< the map that was refined
+  bool automatic = false;  ///< it came from `automatic_map`, not from the features
+  RefineResult refined;
+};
+
+/// One pair, matched step by step so that callers can show how it goes. Not safe for several
+/// threads at a time.
+class Matcher {
+ public:
+  /// Errors: `bad_option` for options out of range or a mesh that is nullptr; those of
+  /// `JointSurface` and `Refiner`.
+  Matcher(std::shared_ptr<const PreparedMesh> source, std::shared_ptr<const PreparedMesh> target,
+          const MatchNetworks& networks, MatchOptions options = {}, ProgressRange progress = {});
+  ~Matcher();
+
+  /// Whether adaptation is over.
+  bool finished() const;
+  /// The next epoch of it. Errors: those of `JointTrainer::epoch`.
+  const JointEpoch& epoch(ProgressRange progress = {});
+  const std::vector<JointEpoch>& history() const;
+  const MatchNetworks& networks() const;  ///< as adapted so far
+
+  /// What the features say now: the point map of the functional map of their soft map. The paper,
+  /// Eqns 12 and 6.
+  InitialMap features_map(ProgressRange progress = {}) const;
+  /// That map, or a more plausible one, refined with the second network (or none).
+  MatchResult result(ProgressRange progress = {}) const;
+  /// Those of the refiner.
+  const std::vector<Note>& notes() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace supple
