@@ -233,6 +233,12 @@ def test_bad_files_of_poses_say_what_is_wrong(tmp_path, arrays, part):
     assert not (tmp_path / "out").exists()
 
 
+def test_what_is_no_file_of_poses_is_named(tmp_path):
+    np.save(tmp_path / "poses.npy", np.zeros((1, 4, 3)))
+    with pytest.raises(ValueError, match=r"poses\.npy is no \.npz file"):
+        shapes.read_poses(tmp_path / "poses.npy")
+
+
 def test_cleaning_splits_vertices_where_fans_meet():
     solid = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
     two = np.concatenate([solid, np.where(solid == 0, 0, solid + 4)])

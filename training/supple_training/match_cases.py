@@ -19,6 +19,7 @@ from typing import Annotated
 import numpy as np
 import typer
 from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
 from supple.cases import write_mesh
 
 from supple_training import bodies, creatures
@@ -48,14 +49,16 @@ class Case:
 
 
 def nearest_vertices(
-    places: FloatArray, normals: FloatArray, vertices: FloatArray, vertex_normals: FloatArray
+    places: FloatArray, normals: FloatArray, vertices: FloatArray, own_normals: FloatArray
 ) -> NDArray[np.int64]:
     """(p,) the nearest of the vertices (n, 3) to each place (p, 3) that faces the same way.
 
+    normals (p, 3), own_normals (n, 3): outwards at the places and at the vertices.
+
     Nearest in space would take the other lip of a closed mouth.
     """
-    apart = np.linalg.norm(places[:, None] - vertices[None], axis=2)
-    away = normals @ vertex_normals.T <= 0
+    apart = cdist(places, vertices)
+    away = normals @ own_normals.T <= 0
     return np.where(away, apart + apart.max(), apart).argmin(axis=1)
 
 

@@ -14,6 +14,7 @@ own. Number i of a seed is the same on every machine with the same package versi
 from __future__ import annotations
 
 import json
+import zipfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -113,6 +114,8 @@ def read_poses(path: Path) -> tuple[NDArray[np.float64], IntArray]:
 
     Raises ValueError when the file holds something else or the mesh cannot be cleaned.
     """
+    if not zipfile.is_zipfile(path):
+        raise ValueError(f"{path} is no .npz file; write one with numpy.savez")
     with np.load(path) as data:
         missing = {"vertices", "faces"} - set(data.files)
         if missing:
@@ -239,6 +242,8 @@ def make(
     """Make shapes without labels: bodies and kinds of creatures, or the poses of a file."""
     if not 500 <= vertices[0] <= vertices[1]:
         raise typer.BadParameter("must be a range from at least 500", param_hint="--vertices")
+    if poses is not None and held_out:
+        raise typer.BadParameter("is of bodies and creatures", param_hint="--held-out")
     settings = ShapeSettings(seed, held_out, vertices)
     try:
         if poses is None:
