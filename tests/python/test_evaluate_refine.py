@@ -2,6 +2,7 @@
 """Sets on disk, their evaluation and the commands over them; no test depends on a duration."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -116,6 +117,23 @@ def test_bad_sets_name_the_file(folder, spoil, parts):
     for part in parts:
         assert part in str(caught.value)
     assert run("evaluate", "refine", folder).exit_code == 1
+
+
+def test_sets_to_match_need_no_maps(folder):
+    np.savetxt(folder / "corres" / "b.mirror.vts", np.arange(1, N + 1, 3)[::-1], fmt="%d")
+    with_maps = match_sets.read_match_set(folder, refine=False)
+    assert with_maps.initial["a", "b"] is not None
+    shutil.rmtree(folder / "init")
+    found = match_sets.read_match_set(folder, refine=False)
+    assert found.initial == {("a", "b"): None, ("b", "a"): None}
+    assert found.shapes["a"].mirror is None
+    assert np.array_equal(found.shapes["b"].mirror, np.arange(0, N, 3)[::-1])
+    with pytest.raises(SuppleError, match=r"a__b\.map"):
+        match_sets.read_match_set(folder)
+    (folder / "corres" / "b.mirror.vts").write_text("1\n")
+    with pytest.raises(SuppleError, match=r"b\.mirror\.vts has 1 lines") as caught:
+        match_sets.read_match_set(folder, refine=False)
+    assert caught.value.code == "bad_set"
 
 
 # --- supple refine --------------------------------------------------------------------------------

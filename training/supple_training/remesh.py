@@ -187,6 +187,41 @@ def remesh(
     )
 
 
+def decimate(
+    vertices: FloatArray,
+    faces: IntArray,
+    rng: np.random.Generator,
+    *,
+    vertex_count: int | tuple[int, int],
+    attempts: int = 20,
+) -> Remeshed:
+    """Triangulate a surface with holes or several pieces again, by decimation only.
+
+    vertices (N, 3), faces (M, 3): no edge has more than two faces. The result has the same Euler
+    characteristic, no collapsed face and none turned over, as that of `remesh`; its vertices are
+    not relaxed, since that would pull the boundary in.
+
+    Raises RuntimeError when none of `attempts` random triangulations is that good.
+    """
+    low, high = (vertex_count, vertex_count) if isinstance(vertex_count, int) else vertex_count
+    wanted = euler_characteristic(faces)
+    for _ in range(attempts):
+        method = METHODS[rng.integers(2)]
+        points, new_faces = _decimate(
+            vertices, faces, method, int(rng.integers(low, high + 1)), rng
+        )
+        corners, weights = _closest(
+            points, igl.per_vertex_normals(points, new_faces), vertices, faces
+        )
+        result = Remeshed(new_faces, corners, weights, method)
+        if euler_characteristic(new_faces) == wanted and _faults(result, vertices) == 0:
+            return result
+    raise RuntimeError(
+        f"none of {attempts} decimations to {low} to {high} vertices was free of collapsed or "
+        "turned-over faces; ask for more vertices, or close and clean the mesh"
+    )
+
+
 def _faults(result: Remeshed, vertices: FloatArray) -> int:
     """The number of collapsed or turned-over faces of a new triangulation on the original."""
     placed = result.carry(vertices)

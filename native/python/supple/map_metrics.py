@@ -100,6 +100,33 @@ def geodesic_errors(
     ]
 
 
+def flipped(
+    target: AnyMesh,
+    truth: ArrayLike,
+    mirror: ArrayLike,
+    images: ArrayLike,
+    *,
+    geodesics: Geodesics | None = None,
+    progress: _native.Progress | None = None,
+) -> list[bool]:
+    """Whether maps take left for right: their images are nearer the mirrored truth than the truth.
+
+    Mean distances along the target are compared. A hundred points that are spread over the mesh are
+    enough; those far from the truth take most of the time.
+
+    Args:
+        truth: (p,) target vertices, where known points belong.
+        mirror: (p,) target vertices, where their mirror images belong.
+        images, geodesics: as for geodesic_errors.
+    """
+    geodesics = geodesics or Geodesics(target.vertices, target.faces)
+    right, wrong = (
+        geodesic_errors(target, points, images, geodesics=geodesics, progress=progress)
+        for points in (truth, mirror)
+    )
+    return [m.mean < t.mean for t, m in zip(right, wrong, strict=True)]
+
+
 def face_inversion(source: AnyMesh, target: AnyMesh, point_map: ArrayLike) -> float:
     """Percent of the source's faces whose image has a normal against the sum of the target's
     vertex normals at its three corners."""

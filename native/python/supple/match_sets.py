@@ -3,7 +3,8 @@
 
 shapes/NAME.off      a mesh, in its own units and triangulation
 corres/NAME.vts      line t: the 1-based vertex of NAME that stands for template point t
-init/A__B.map        line i: the 1-based vertex of B that vertex i of A maps to
+corres/NAME.mirror.vts   optional: the same for the mirror image of template point t
+init/A__B.map        line i: the 1-based vertex of B that vertex i of A maps to; to refine only
 pairs.txt            "A B" a line: the pairs, source A, target B
 """
 
@@ -26,12 +27,15 @@ class MatchShape:
         name: as in pairs.txt.
         vertices, faces: (n, 3) and (m, 3).
         template: (p,) the vertex, 0-based, of each template point.
+        mirror: (p,) the vertex of each one's mirror image, left for right; None where the set does
+            not say.
     """
 
     name: str
     vertices: NDArray[np.float64]
     faces: NDArray[np.int32]
     template: NDArray[np.int32]
+    mirror: NDArray[np.int32] | None = None
 
 
 @dataclass(frozen=True)
@@ -42,17 +46,20 @@ class MatchSet:
         name: the folder's name.
         shapes: by name.
         pairs: (source, target) names.
-        initial: (n_source,) the map of each pair, 0-based.
+        initial: (n_source,) the map of each pair, 0-based; None where the set has no maps.
     """
 
     name: str
     shapes: dict[str, MatchShape]
     pairs: list[tuple[str, str]]
-    initial: dict[tuple[str, str], NDArray[np.int32]]
+    initial: dict[tuple[str, str], NDArray[np.int32] | None]
 
 
-def read_match_set(folder: str | os.PathLike) -> MatchSet:
+def read_match_set(folder: str | os.PathLike, *, refine: bool = True) -> MatchSet:
     """Read a set, all of it.
+
+    Args:
+        refine: the set must have maps to refine; otherwise the folder `init` may be missing.
 
     Raises:
         SuppleError: bad_set, naming the file and what is wrong with it.
@@ -71,6 +78,9 @@ def read_match_set(folder: str | os.PathLike) -> MatchSet:
                 f"{folder / 'corres' / a}.vts has {points[0]} lines, {b}.vts {points[1]}; both are "
                 "of the same template points.",
             )
+        if not refine and not (folder / "init").is_dir():
+            initial[a, b] = None
+            continue
         path = folder / "init" / f"{a}__{b}.map"
         initial[a, b] = read_indices(path, len(shapes[b].vertices), f"vertices of {b}")
         if len(initial[a, b]) != len(shapes[a].vertices):
@@ -137,4 +147,14 @@ def _read_shape(folder: Path, name: str) -> MatchShape:
     except SuppleError as error:
         raise SuppleError("bad_set", str(error)) from error
     template = read_indices(folder / "corres" / f"{name}.vts", len(vertices), f"vertices of {name}")
-    return MatchShape(name, vertices, faces, template)
+    mirror = None
+    path = folder / "corres" / f"{name}.mirror.vts"
+    if path.is_file():
+        mirror = read_indices(path, len(vertices), f"vertices of {name}")
+        if len(mirror) != len(template):
+            raise SuppleError(
+                "bad_set",
+                f"{path} has {len(mirror)} lines, {name}.vts {len(template)}; both are of the same "
+                "template points.",
+            )
+    return MatchShape(name, vertices, faces, template, mirror)

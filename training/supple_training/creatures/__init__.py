@@ -36,7 +36,7 @@ from supple_training.remesh import (
 )
 
 _ATTEMPTS = 20
-_CREATURES = 5
+CREATURES = 5
 """How many creatures are tried before it is given up: one bad draw must not end a long run."""
 
 WALKERS = ("quadruped", "biped", "sprawler", "bird", "insect")
@@ -96,8 +96,11 @@ def sample_creature(
     held_out: bool = False,
     vertices: tuple[int, int] = (3500, 6500),
     family: str | None = None,
+    suits: Callable[[Skeleton], bool] = lambda _: True,
 ) -> Creature:
     """A random creature in a triangulation of its own, of a random family unless one is named.
+
+    Skeletons are drawn again until one `suits`.
 
     Raises RuntimeError when none of several skins is a single closed surface that can be
     triangulated with so few vertices.
@@ -107,6 +110,8 @@ def sample_creature(
     maker = makers[int(rng.choice(len(makers), p=share / share.sum()))]
     for _ in range(_ATTEMPTS):
         skeleton = maker(*sample_traits(rng, held_out=held_out), rng)
+        while not suits(skeleton):
+            skeleton = maker(*sample_traits(rng, held_out=held_out), rng)
         made = skin(skeleton, rng)
         if made is None:
             continue
@@ -198,7 +203,7 @@ def walk_cycle(
 
 def retried(make: Callable[[], _T]) -> _T:
     """What `make` returns, called again where it raises RuntimeError, which is raised at last."""
-    for _ in range(_CREATURES - 1):
+    for _ in range(CREATURES - 1):
         try:
             return make()
         except RuntimeError:
