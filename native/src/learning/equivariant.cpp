@@ -10,6 +10,14 @@
 namespace supple::equivariant {
 namespace {
 
+template <class Scalar>
+struct Reference {
+  Mat3<Scalar> matrix, defect;  // C, C C^T - I
+  explicit Reference(const Matrix3& exact)
+      : matrix(exact.template cast<Scalar>()),
+        defect((exact * exact.transpose() - Matrix3::Identity()).template cast<Scalar>()) {}
+};
+
 // Y Y^T - I with Y = C + e.
 template <class Scalar>
 Mat3<Scalar> defect_of(const Reference<Scalar>& reference, const Mat3<Scalar>& e) {

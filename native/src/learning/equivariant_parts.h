@@ -44,14 +44,6 @@ struct Combination {
 };
 enum Place { kSum = 9, kNormalSum = 10, kFirst = 11, kNormalFirst = 12 };
 
-template <class Scalar>
-struct Reference {
-  Mat3<Scalar> matrix, defect;  // C, C C^T - I
-  explicit Reference(const Matrix3& exact)
-      : matrix(exact.template cast<Scalar>()),
-        defect((exact * exact.transpose() - Matrix3::Identity()).template cast<Scalar>()) {}
-};
-
 /// The fields' parts in each band of eigenfunctions between two scales, for some vertices: rows x
 /// (fields * 16) a band.
 template <class Scalar>

@@ -144,12 +144,12 @@ INSTANTIATE_TEST_SUITE_P(
     kind_name);
 
 // More vertices than are worked on together: sums of several chunks.
-class NetworkSignalGradientOfChunksSlow : public NetworkSignalGradient {
+class NetworkSignalGradientOfChunks : public NetworkSignalGradient {
  protected:
-  NetworkSignalGradientOfChunksSlow() : NetworkSignalGradient(zoo::perturbed_sphere(4, 3)) {}
+  NetworkSignalGradientOfChunks() : NetworkSignalGradient(zoo::perturbed_sphere(4, 3)) {}
 };
 
-TEST_P(NetworkSignalGradientOfChunksSlow, AlongADirection) {
+TEST_P(NetworkSignalGradientOfChunks, AlongADirection) {
   ASSERT_GT(rest.operators.vertices.rows(), 2048);
   const Signal analytic = gradient();
   const Signal start = signal;
@@ -171,7 +171,7 @@ TEST_P(NetworkSignalGradientOfChunksSlow, AlongADirection) {
   EXPECT_NEAR(test::central_difference(along, t), expected, 1e-6 * std::abs(expected));
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, NetworkSignalGradientOfChunksSlow,
+INSTANTIATE_TEST_SUITE_P(Kinds, NetworkSignalGradientOfChunks,
                          ::testing::Values(Kind{Configuration::equivariant, SignalKind::spectral,
                                                 200}),
                          kind_name);
