@@ -22,6 +22,32 @@ Matrix3 rotation_by_svd(const Matrix3& j) {
   return u * svd.matrixV().transpose();
 }
 
+// Gradient with respect to the vertices, where grad_of(f) is that with respect to face f's frame.
+template <class GradFrame>
+Points frames_backward(const Points& vertices, const Faces& faces, const GradFrame& grad_of) {
+  Points result = Points::Zero(vertices.rows(), 3);
+  for (Eigen::Index f = 0; f < faces.rows(); ++f) {
+    const Matrix3 grad_frame = grad_of(f);
+    const Eigen::RowVector3d e1 = vertices.row(faces(f, 1)) - vertices.row(faces(f, 0));
+    const Eigen::RowVector3d e2 = vertices.row(faces(f, 2)) - vertices.row(faces(f, 0));
+    const Eigen::RowVector3d cross = e1.cross(e2);
+    const double length = cross.norm();
+    Eigen::RowVector3d grad_e1 = grad_frame.row(0), grad_e2 = grad_frame.row(1);
+    if (length > 0.0) {
+      const Eigen::RowVector3d normal = cross / length;
+      const Eigen::RowVector3d grad_normal = grad_frame.row(2);
+      const Eigen::RowVector3d grad_cross =
+          (grad_normal - normal * normal.dot(grad_normal)) / length;
+      grad_e1 += e2.cross(grad_cross);
+      grad_e2 += grad_cross.cross(e1);
+    }
+    result.row(faces(f, 1)) += grad_e1;
+    result.row(faces(f, 2)) += grad_e2;
+    result.row(faces(f, 0)) -= grad_e1 + grad_e2;
+  }
+  return result;
+}
+
 }  // namespace
 
 MatrixField face_frames(const Points& vertices, const Faces& faces) {
@@ -39,6 +65,11 @@ MatrixField face_frames(const Points& vertices, const Faces& faces) {
     frame.row(2) = length > 0.0 ? Eigen::RowVector3d(cross / length) : Eigen::RowVector3d::Zero();
   }
   return frames;
+}
+
+Points face_frames_backward(const Points& vertices, const Faces& faces, const MatrixField& grad) {
+  return frames_backward(vertices, faces,
+                         [&](Eigen::Index f) -> Matrix3 { return matrix_at(grad, f); });
 }
 
 MatrixField inverse_frames(const MatrixField& frames) {
@@ -66,27 +97,9 @@ MatrixField jacobians(const MatrixField& inverse_rest_frames, const Points& move
 
 Points jacobians_backward(const MatrixField& inverse_rest_frames, const Points& moved,
                           const Faces& faces, const MatrixField& grad) {
-  Points result = Points::Zero(moved.rows(), 3);
-  for (Eigen::Index f = 0; f < faces.rows(); ++f) {
-    const Matrix3 grad_frame = matrix_at(inverse_rest_frames, f).transpose() * matrix_at(grad, f);
-    const Eigen::RowVector3d e1 = moved.row(faces(f, 1)) - moved.row(faces(f, 0));
-    const Eigen::RowVector3d e2 = moved.row(faces(f, 2)) - moved.row(faces(f, 0));
-    const Eigen::RowVector3d cross = e1.cross(e2);
-    const double length = cross.norm();
-    Eigen::RowVector3d grad_e1 = grad_frame.row(0), grad_e2 = grad_frame.row(1);
-    if (length > 0.0) {
-      const Eigen::RowVector3d normal = cross / length;
-      const Eigen::RowVector3d grad_normal = grad_frame.row(2);
-      const Eigen::RowVector3d grad_cross =
-          (grad_normal - normal * normal.dot(grad_normal)) / length;
-      grad_e1 += e2.cross(grad_cross);
-      grad_e2 += grad_cross.cross(e1);
-    }
-    result.row(faces(f, 1)) += grad_e1;
-    result.row(faces(f, 2)) += grad_e2;
-    result.row(faces(f, 0)) -= grad_e1 + grad_e2;
-  }
-  return result;
+  return frames_backward(moved, faces, [&](Eigen::Index f) -> Matrix3 {
+    return matrix_at(inverse_rest_frames, f).transpose() * matrix_at(grad, f);
+  });
 }
 
 Matrix3 closest_rotation(const Matrix3& j) {

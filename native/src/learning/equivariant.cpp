@@ -3,45 +3,12 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <array>
 
+#include "equivariant_parts.h"
 #include "supple/core/simd.h"
-#include "supple/core/tall.h"
 
 namespace supple::equivariant {
 namespace {
-
-// A 3x3 matrix takes 16 numbers, of which 9 are used: whole vectors, without a remainder.
-constexpr Eigen::Index kPadded = 16;
-// Vertices worked on together, so that what they share stays in the cache.
-constexpr Eigen::Index kChunk = 2048;
-
-template <class Scalar>
-Mat3<Scalar> matrix_of(const Scalar* numbers) {
-  return Eigen::Map<const Mat3<Scalar>>(numbers);
-}
-
-// Where the output's coefficients are, for so many fields.
-struct Layout {
-  int fields;
-  // Of field i < fields - 1 as it is; + 1 with P.
-  int plain(int i) const { return 2 * i; }
-  // Of field i at scale s; + 1 with P.
-  int smooth(int i, int s) const { return 2 * (fields - 1) + 2 * (i * kScaleCount + s); }
-  int defect(int s) const { return 2 * (fields - 1) + 2 * fields * kScaleCount + s; }
-};
-
-// What a vertex contributes to J - L at its faces: sum, mixed, defect are
-//   E = sum c (Y - C), F = sum c' (Y - C), D = sum c'' (Y Y^T - I)
-// and the sums of c, of c', and the coefficients of X_0 (two fields), so that
-//   J - L = E - e (L - C) + P (F - f (L - C)) + D L + x (X_0 - L) + x' P (X_0 - L).
-template <class Scalar>
-struct Combination {
-  Scalar along[kPadded];   // E; then e, f, x, x' at 9..12
-  Scalar normal[kPadded];  // F
-  Scalar defect[kPadded];  // D
-};
-enum Place { kSum = 9, kNormalSum = 10, kFirst = 11, kNormalFirst = 12 };
 
 template <class Scalar>
 struct Reference {
@@ -57,49 +24,6 @@ Mat3<Scalar> defect_of(const Reference<Scalar>& reference, const Mat3<Scalar>& e
   const Mat3<Scalar> mixed = reference.matrix * e.transpose();
   return reference.defect + mixed + mixed.transpose() + e * e.transpose();
 }
-
-// The fields' parts in each band of eigenfunctions between two scales, for some vertices: rows x
-// (fields * 16) a band.
-template <class Scalar>
-class Bands {
- public:
-  Bands(const NetworkContext<Scalar>& context, const Fields<Scalar>& fields)
-      : context_(context), fields_(static_cast<int>(fields.coefficients.cols() / kPadded)) {
-    Eigen::Index done = 0;
-    for (int s = 0; s < kScaleCount; ++s) {
-      const Eigen::Index width = context.scales[static_cast<size_t>(s)] - done;
-      starts_[static_cast<size_t>(s)] = done;
-      coefficients_[static_cast<size_t>(s)] = fields.coefficients.middleRows(done, width);
-      done += width;
-    }
-  }
-
-  int fields() const { return fields_; }
-  // Expands for `rows` vertices from `first` on.
-  void expand(Eigen::Index first, Eigen::Index rows) {
-    values_.setZero(rows, kScaleCount * fields_ * kPadded);
-    for (int s = 0; s < kScaleCount; ++s) {
-      const RowMatrix<Scalar>& c = coefficients_[static_cast<size_t>(s)];
-      if (c.rows() > 0) {
-        add_tall_product<Scalar>(
-            Scalar(1),
-            {context_.functions.block(first, starts_[static_cast<size_t>(s)], rows, c.rows())}, c,
-            values_.middleCols(s * fields_ * kPadded, fields_ * kPadded));
-      }
-    }
-  }
-  // 16 numbers: field i in band s at row r of those expanded.
-  const Scalar* at(Eigen::Index r, int i, int s) const {
-    return values_.row(r).data() + (s * fields_ + i) * kPadded;
-  }
-
- private:
-  const NetworkContext<Scalar>& context_;
-  int fields_;
-  std::array<Eigen::Index, kScaleCount> starts_{};
-  std::array<RowMatrix<Scalar>, kScaleCount> coefficients_;
-  RowMatrix<Scalar> values_;
-};
 
 // 3x3 matrices as nine numbers, in loops that compile for any instruction set.
 template <class Scalar>
@@ -295,8 +219,7 @@ struct Face {
 };
 
 template <class Scalar>
-Face<Scalar> face_at(const NetworkContext<Scalar>& context, const Fields<Scalar>& fields,
-                     Eigen::Index f) {
+Face<Scalar> face_at(const Fields<Scalar>& fields, Eigen::Index f) {
   const auto lead = matrix_at(fields.signal->fields.back(), f);
   Face<Scalar> face;
   face.whole_lead = lead.template cast<Scalar>();
@@ -304,22 +227,6 @@ Face<Scalar> face_at(const NetworkContext<Scalar>& context, const Fields<Scalar>
   face.first = (matrix_at(fields.signal->fields.front(), f) - lead).template cast<Scalar>();
   face.normal = fields.look->face_normals->row(f).template cast<Scalar>();
   return face;
-}
-
-template <class Scalar, class Visit>
-void for_each_chunk(const NetworkContext<Scalar>& context, const Fields<Scalar>& fields,
-                    const Visit& visit) {
-  const Eigen::Index n = context.functions.rows();
-#pragma omp parallel
-  {
-    Bands<Scalar> bands(context, fields);
-#pragma omp for schedule(static)
-    for (Eigen::Index first = 0; first < n; first += kChunk) {
-      const Eigen::Index rows = std::min(kChunk, n - first);
-      bands.expand(first, rows);
-      visit(bands, first, rows);
-    }
-  }
 }
 
 }  // namespace
@@ -351,18 +258,14 @@ Fields<Scalar> project_fields(const NetworkContext<Scalar>& context, const Signa
 }
 
 template <class Scalar>
-RowMatrix<Scalar> invariants(const NetworkContext<Scalar>& context, const Fields<Scalar>& fields) {
-  const SurfaceOperators& operators = *context.operators;
-  const auto count = static_cast<int>(fields.signal->fields.size());
-  const Mat3<Scalar> reference = fields.reference.template cast<Scalar>();
-  RowMatrix<Scalar> result(context.samples.size(), input_count(count));
-  // Matrices of a sample: the fields as they are, then each at its scales.
-  std::array<RowMatrix<Scalar>, kScaleCount> smooth;
+SampleMatrices<Scalar>::SampleMatrices(const NetworkContext<Scalar>& context,
+                                       const Fields<Scalar>& fields)
+    : context_(context), fields_(fields) {
   Eigen::Index done = 0;
   for (int s = 0; s < kScaleCount; ++s) {
-    auto& here = smooth[static_cast<size_t>(s)];
+    auto& here = smooth_[static_cast<size_t>(s)];
     here = s == 0 ? RowMatrix<Scalar>::Zero(context.samples.size(), fields.coefficients.cols())
-                  : smooth[static_cast<size_t>(s - 1)];
+                  : smooth_[static_cast<size_t>(s - 1)];
     const Eigen::Index width = context.scales[static_cast<size_t>(s)] - done;
     if (width > 0) {
       add_tall_product<Scalar>(Scalar(1), {context.domain.functions.middleCols(done, width)},
@@ -370,24 +273,40 @@ RowMatrix<Scalar> invariants(const NetworkContext<Scalar>& context, const Fields
       done += width;
     }
   }
+}
+
+template <class Scalar>
+void SampleMatrices<Scalar>::at(Eigen::Index p, std::vector<Mat3<Scalar>>& matrices) const {
+  const auto count = static_cast<int>(fields_.signal->fields.size());
+  const Mat3<Scalar> reference = fields_.reference.template cast<Scalar>();
+  matrices.resize(static_cast<size_t>(matrix_count(count)));
+  size_t next = 0;
+  for (const MatrixField& field : fields_.signal->fields) {
+    const Eigen::Matrix<double, 1, 9> mean =
+        vertex_average(*context_.operators, field, context_.samples[p]);
+    matrices[next++] = Eigen::Map<const Matrix3>(mean.data()).template cast<Scalar>();
+  }
+  for (int i = 0; i < count; ++i) {
+    for (int s = 0; s < kScaleCount; ++s) {
+      matrices[next++] =
+          reference + matrix_of(smooth_[static_cast<size_t>(s)].row(p).data() + kPadded * i);
+    }
+  }
+}
+
+template <class Scalar>
+RowMatrix<Scalar> invariants(const NetworkContext<Scalar>& context, const Fields<Scalar>& fields) {
+  const auto count = static_cast<int>(fields.signal->fields.size());
+  RowMatrix<Scalar> result(context.samples.size(), input_count(count));
+  const SampleMatrices<Scalar> samples(context, fields);
 #pragma omp parallel
   {
-    std::vector<Mat3<Scalar>> matrices(static_cast<size_t>(matrix_count(count)));
+    std::vector<Mat3<Scalar>> matrices;
 #pragma omp for schedule(static)
     for (Eigen::Index p = 0; p < context.samples.size(); ++p) {
-      const int v = context.samples[p];
-      size_t next = 0;
-      for (const MatrixField& field : fields.signal->fields) {
-        const Eigen::Matrix<double, 1, 9> mean = vertex_average(operators, field, v);
-        matrices[next++] = Eigen::Map<const Matrix3>(mean.data()).template cast<Scalar>();
-      }
-      for (int i = 0; i < count; ++i) {
-        for (int s = 0; s < kScaleCount; ++s) {
-          matrices[next++] =
-              reference + matrix_of(smooth[static_cast<size_t>(s)].row(p).data() + kPadded * i);
-        }
-      }
-      const Row3<Scalar> normal = fields.look->vertex_normals->row(v).template cast<Scalar>();
+      samples.at(p, matrices);
+      const Row3<Scalar> normal =
+          fields.look->vertex_normals->row(context.samples[p]).template cast<Scalar>();
       point_invariants(matrices, normal, result.row(p).data());
       result.row(p).tail(2 * kScaleCount) = fields.look->shape.row(p);
     }
@@ -396,11 +315,11 @@ RowMatrix<Scalar> invariants(const NetworkContext<Scalar>& context, const Fields
 }
 
 template <class Scalar>
-MatrixField correct_faces(const NetworkContext<Scalar>& context, const Fields<Scalar>& fields,
-                          const RowMatrix<Scalar>& outputs) {
-  const SurfaceOperators& operators = *context.operators;
+std::vector<Combination<Scalar>> combine_at_vertices(const NetworkContext<Scalar>& context,
+                                                     const Fields<Scalar>& fields,
+                                                     const RowMatrix<Scalar>& outputs) {
   const Reference<Scalar> reference(fields.reference);
-  std::vector<Combination<Scalar>> at_vertices(static_cast<size_t>(operators.vertices.rows()));
+  std::vector<Combination<Scalar>> at_vertices(static_cast<size_t>(context.functions.rows()));
   const auto combine = best_kernel(&Kernels<Scalar>::combine_avx512, &Kernels<Scalar>::combine_avx2,
                                    &Kernels<Scalar>::combine_plain);
   for_each_chunk(
@@ -415,7 +334,15 @@ MatrixField correct_faces(const NetworkContext<Scalar>& context, const Fields<Sc
         std::copy_n(reference.defect.data(), 9, task.defect);
         combine(task);
       });
+  return at_vertices;
+}
 
+template <class Scalar>
+MatrixField correct_faces(const NetworkContext<Scalar>& context, const Fields<Scalar>& fields,
+                          const RowMatrix<Scalar>& outputs) {
+  const SurfaceOperators& operators = *context.operators;
+  const std::vector<Combination<Scalar>> at_vertices =
+      combine_at_vertices(context, fields, outputs);
   const Eigen::Index m = operators.faces.rows();
   MatrixField result(m, 9);
   FaceTask<Scalar> task{operators.faces.data(),
@@ -436,14 +363,12 @@ MatrixField correct_faces(const NetworkContext<Scalar>& context, const Fields<Sc
 }
 
 template <class Scalar>
-RowMatrix<Scalar> correct_faces_backward(const NetworkContext<Scalar>& context,
-                                         const Fields<Scalar>& fields, const MatrixField& grad) {
-  const SurfaceOperators& operators = *context.operators;
-  const Reference<Scalar> reference(fields.reference);
-  std::vector<Combination<Scalar>> at_faces(static_cast<size_t>(operators.faces.rows()));
+std::vector<Combination<Scalar>> combinations_backward(const Fields<Scalar>& fields,
+                                                       const MatrixField& grad) {
+  std::vector<Combination<Scalar>> at_faces(static_cast<size_t>(grad.rows()));
 #pragma omp parallel for schedule(static)
-  for (Eigen::Index f = 0; f < operators.faces.rows(); ++f) {
-    const Face<Scalar> face = face_at(context, fields, f);
+  for (Eigen::Index f = 0; f < grad.rows(); ++f) {
+    const Face<Scalar> face = face_at(fields, f);
     const Mat3<Scalar> g = matrix_at(grad, f).template cast<Scalar>() * Scalar(1.0 / 3.0);
     const Mat3<Scalar> normal = face.normal.transpose() * (face.normal * g);  // P is symmetric
     Combination<Scalar>& c = at_faces[static_cast<size_t>(f)];
@@ -456,24 +381,24 @@ RowMatrix<Scalar> correct_faces_backward(const NetworkContext<Scalar>& context,
     c.along[kFirst] = g.cwiseProduct(face.first).sum();
     c.along[kNormalFirst] = normal.cwiseProduct(face.first).sum();
   }
+  return at_faces;
+}
+
+template <class Scalar>
+RowMatrix<Scalar> correct_faces_backward(const NetworkContext<Scalar>& context,
+                                         const Fields<Scalar>& fields, const MatrixField& grad) {
+  const SurfaceOperators& operators = *context.operators;
+  const Reference<Scalar> reference(fields.reference);
+  const std::vector<Combination<Scalar>> at_faces = combinations_backward(fields, grad);
   const int outputs = output_count(static_cast<int>(fields.signal->fields.size()));
   RowMatrix<Scalar> at_vertices(operators.vertices.rows(), outputs);
-  for_each_chunk(
-      context, fields, [&](const Bands<Scalar>& bands, Eigen::Index first, Eigen::Index rows) {
-        for (Eigen::Index r = 0; r < rows; ++r) {
-          Combination<Scalar> sum = {};
-          // The averaging's pattern lists a vertex's faces.
-          for (SparseRowMatrix::InnerIterator it(operators.average, first + r); it; ++it) {
-            const auto& at = at_faces[static_cast<size_t>(it.col())];
-            for (Eigen::Index e = 0; e < kPadded; ++e) {
-              sum.along[e] += at.along[e];
-              sum.normal[e] += at.normal[e];
-              sum.defect[e] += at.defect[e];
-            }
-          }
-          combine_backward(bands, r, reference, sum, at_vertices.row(first + r).data());
-        }
-      });
+  for_each_chunk(context, fields,
+                 [&](const Bands<Scalar>& bands, Eigen::Index first, Eigen::Index rows) {
+                   for (Eigen::Index r = 0; r < rows; ++r) {
+                     combine_backward(bands, r, reference, gathered(operators, at_faces, first + r),
+                                      at_vertices.row(first + r).data());
+                   }
+                 });
   return tall_product<Scalar>({context.functions}, at_vertices);
 }
 
@@ -482,6 +407,11 @@ RowMatrix<Scalar> correct_faces_backward(const NetworkContext<Scalar>& context,
   template RowMatrix<Scalar> invariants(const NetworkContext<Scalar>&, const Fields<Scalar>&); \
   template MatrixField correct_faces(const NetworkContext<Scalar>&, const Fields<Scalar>&,     \
                                      const RowMatrix<Scalar>&);                                \
+  template class SampleMatrices<Scalar>;                                                       \
+  template std::vector<Combination<Scalar>> combine_at_vertices(                               \
+      const NetworkContext<Scalar>&, const Fields<Scalar>&, const RowMatrix<Scalar>&);         \
+  template std::vector<Combination<Scalar>> combinations_backward(const Fields<Scalar>&,       \
+                                                                  const MatrixField&);         \
   template RowMatrix<Scalar> correct_faces_backward(const NetworkContext<Scalar>&,             \
                                                     const Fields<Scalar>&, const MatrixField&);
 SUPPLE_INSTANTIATE(float)

@@ -64,6 +64,14 @@ template <class Scalar>
 RowMatrix<Scalar> correct_faces_backward(const NetworkContext<Scalar>& context,
                                          const Fields<Scalar>& fields, const MatrixField& grad);
 
+/// The gradient with respect to the signal's fields, m x 9 each, from the m x 9 one with respect to
+/// the Jacobians of `correct_faces(context, fields, outputs)` and from the p x input_count one with
+/// respect to `invariants(context, fields)`, where `outputs` follow from these.
+template <class Scalar>
+Signal signal_gradient(const NetworkContext<Scalar>& context, const Fields<Scalar>& fields,
+                       const RowMatrix<Scalar>& outputs, const MatrixField& grad,
+                       const RowMatrix<Scalar>& grad_invariants);
+
 /// Invariants of one vertex, written to `out` (input_count - 2 kScaleCount numbers).
 template <class Scalar>
 void point_invariants(const std::vector<Mat3<Scalar>>& matrices, const Row3<Scalar>& normal,

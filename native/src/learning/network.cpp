@@ -8,6 +8,7 @@
 #include "supple/core/error.h"
 #include "supple/geometry/operators.h"
 #include "tensors.h"
+#include "vertex_average.h"
 
 namespace supple {
 namespace {
@@ -196,27 +197,54 @@ MatrixField LocalJacobianNetwork<Scalar>::forward(const NetworkContext<Scalar>& 
   }
   auto fields = equivariant::project_fields(context, signal);
   fields.look = look == nullptr ? &context.rest : look;
-  const RowMatrix<Scalar> output = layers(equivariant::invariants(context, fields));
-  return equivariant::correct_faces(context, fields, product(context.domain.projector, output));
+  const RowMatrix<Scalar> output =
+      product(context.domain.projector, layers(equivariant::invariants(context, fields)));
+  MatrixField result = equivariant::correct_faces(context, fields, output);
+  if (trace != nullptr) {
+    trace->reference = fields.reference;
+    trace->coefficients = std::move(fields.coefficients);
+    trace->outputs = output;
+  }
+  return result;
 }
 
 template <class Scalar>
 void LocalJacobianNetwork<Scalar>::backward(const NetworkContext<Scalar>& context,
                                             const Signal& signal, const Trace& trace,
                                             const MatrixField& grad,
-                                            LayerParameters<Scalar>& gradient) const {
+                                            LayerParameters<Scalar>& gradient,
+                                            Signal* signal_gradient) const {
+  const SurfaceOperators& operators = *context.operators;
+  const bool paper = architecture_.configuration == Configuration::paper;
+  equivariant::Fields<Scalar> fields;
   RowMatrix<Scalar> grad_output;
-  if (architecture_.configuration == Configuration::paper) {
+  if (paper) {
     const RowMatrix<Scalar> grad_faces = grad.template cast<Scalar>();
-    grad_output = average_vertices_to_faces_backward(
-        context.operators->faces, context.operators->vertices.rows(), grad_faces);
+    grad_output =
+        average_vertices_to_faces_backward(operators.faces, operators.vertices.rows(), grad_faces);
   } else {
-    const RowMatrix<Scalar> spectral = equivariant::correct_faces_backward(
-        context, equivariant::project_fields(context, signal), grad);
+    fields = {&signal, &context.rest, trace.reference, trace.coefficients};
+    const RowMatrix<Scalar> spectral = equivariant::correct_faces_backward(context, fields, grad);
     grad_output = product(context.domain.projector, Op::transpose, spectral, Op::none);
   }
-  spectral_mlp_backward(architecture_.sizes(), parameters_, context.domain, trace.mlp, grad_output,
-                        gradient);
+  RowMatrix<Scalar> grad_input = spectral_mlp_backward(
+      architecture_.sizes(), parameters_, context.domain, trace.mlp, grad_output, gradient);
+  if (signal_gradient == nullptr) {
+    return;
+  }
+  grad_input.array().rowwise() *= scale_.array();
+  if (!paper) {
+    *signal_gradient =
+        equivariant::signal_gradient(context, fields, trace.outputs, grad, grad_input);
+    return;
+  }
+  MatrixField at_vertices = MatrixField::Zero(operators.vertices.rows(), 9);
+  for (Eigen::Index p = 0; p < grad_input.rows(); ++p) {
+    at_vertices.row(context.samples[p]) = grad_input.row(p).template cast<double>();
+  }
+  const MatrixField none = MatrixField::Zero(operators.faces.rows(), 9);
+  signal_gradient->fields.assign(signal.fields.size(), none);
+  add_vertex_average_backward(operators, at_vertices, signal_gradient->fields.front());
 }
 
 template struct NetworkContext<float>;

@@ -10,6 +10,11 @@ namespace supple {
 /// A face without area has a zero normal row. Source: the paper's E, section 3.
 MatrixField face_frames(const Points& vertices, const Faces& faces);
 
+/// n x 3: gradient with respect to the vertices, from the m x 9 gradient with respect to
+/// `face_frames(...)`; includes the turning of the unit normal. Where that is 0, so is its
+/// derivative.
+Points face_frames_backward(const Points& vertices, const Faces& faces, const MatrixField& grad);
+
 /// m x 9: inverse of each frame. Needs faces with an area.
 MatrixField inverse_frames(const MatrixField& frames);
 

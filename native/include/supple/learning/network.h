@@ -115,16 +115,24 @@ class LocalJacobianNetwork {
   /// input.mean and input.scale (1 x inputs): layers see (x - mean) * scale.
   void set_normalisation(const Row& mean, const Row& scale);
 
+  /// What `forward` keeps for `backward`; all but the layers' own is of `equivariant` alone.
   struct Trace {
     SpectralMlpTrace<Scalar> mlp;
+    Matrix3 reference;               ///< mean of the signal's last field by area
+    RowMatrix<Scalar> coefficients;  ///< k x 16 a field: the signal in the eigenfunctions
+    RowMatrix<Scalar> outputs;       ///< k x outputs: the layers' answer in the eigenfunctions
   };
   /// m x 9 Jacobians of a signal. look: nullptr for that at rest; else that of the pose which the
   /// signal starts from.
   MatrixField forward(const NetworkContext<Scalar>& context, const Signal& signal,
                       Trace* trace = nullptr, const SurfaceLook<Scalar>* look = nullptr) const;
-  /// Adds to `gradient` from the m x 9 gradient with respect to `forward`.
+  /// Adds to `gradient` from the m x 9 gradient with respect to `forward`. trace: that of `forward`
+  /// for the same context and signal, with the look at rest.
+  /// signal_gradient: where not nullptr, set to the gradient with respect to the signal's fields,
+  /// m x 9 each; `spectral_signal_backward` takes it on to the coarse target.
   void backward(const NetworkContext<Scalar>& context, const Signal& signal, const Trace& trace,
-                const MatrixField& grad, LayerParameters<Scalar>& gradient) const;
+                const MatrixField& grad, LayerParameters<Scalar>& gradient,
+                Signal* signal_gradient = nullptr) const;
   /// p x inputs, before normalisation. For the training set's mean and deviation.
   RowMatrix<Scalar> raw_inputs(const NetworkContext<Scalar>& context, const Signal& signal) const;
 

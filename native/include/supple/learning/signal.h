@@ -41,6 +41,14 @@ Signal spectral_signal(const SurfaceOperators& source, const Eigenbasis& basis,
 Signal spectral_signal(const SurfaceOperators& source, const Points& coarse_source,
                        const Points& coarse_target);
 
+/// n x 3: gradient with respect to the coarse target, from that with respect to the fields of
+/// `spectral_signal(source, coarse_source, coarse_target)`, held by `grad` in the same places. The
+/// source side is fixed. Faces without a normal there, flattened below 1e-9 of their area at rest,
+/// have no derivative of one; of rotations that are not unique see `closest_rotation_backward`.
+/// Errors: `wrong_shape` where `grad` is not two m x 9 fields or the points are not n x 3.
+Points spectral_signal_backward(const SurfaceOperators& source, const Points& coarse_source,
+                                const Points& coarse_target, const Signal& grad);
+
 /// The coarse target of a pair in 1:1 correspondence, the paper's Eqn 10 with the true map:
 /// Phi1 Phi1^+ Phi2 Phi2^+ V2, n x 3.
 Points spectral_target(const Eigenbasis& source_basis, const Eigenbasis& target_basis,
