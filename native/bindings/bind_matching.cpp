@@ -181,21 +181,20 @@ void bind_matching(py::module_& module) {
            }),
            py::arg("source"), py::arg("target"), py::arg("networks"), py::arg("options"),
            py::arg("progress") = nullptr, NoGil())
-      .def_property_readonly("finished", &Matcher::finished)
       .def_property_readonly("history", &Matcher::history)
       .def_property_readonly("notes", &Matcher::notes)
       .def("networks",
            [](const Matcher& m) { return std::make_shared<MatchNetworks>(m.networks()); })
       .def(
-          "epoch", [](Matcher& m, Progress* progress) { return m.epoch(range(progress)); },
-          py::arg("progress") = nullptr, NoGil())
-      .def(
           "features_map",
           [](const Matcher& m, Progress* progress) { return m.features_map(range(progress)); },
           py::arg("progress") = nullptr, NoGil())
       .def(
-          "result", [](const Matcher& m, Progress* progress) { return m.result(range(progress)); },
-          py::arg("progress") = nullptr, NoGil());
+          "run",
+          [](Matcher& m, const std::function<void(const JointEpoch&)>& watch, Progress* progress) {
+            return m.run(range(progress), watch);
+          },
+          py::arg("watch") = nullptr, py::arg("progress") = nullptr, NoGil());
 }
 
 }  // namespace supple::bindings

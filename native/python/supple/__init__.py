@@ -35,6 +35,13 @@ from .map_metrics import (
     map_dirichlet,
     vertex_inversion,
 )
+from .match_model import (
+    MatchModel,
+    load_match_model,
+    shipped_match_models,
+    untrained_match_model,
+)
+from .matching import Matcher, MatchResult, match
 from .mesh import Mesh, Note, PreparedMesh
 from .metrics import face_distortion, flipped_faces, pose_error, symmetric_dirichlet
 from .model import Model, load_model, shipped_models
@@ -69,6 +76,9 @@ __all__ = [
     "InitialMap",
     "KeptFrames",
     "MapScore",
+    "MatchModel",
+    "MatchResult",
+    "Matcher",
     "Mesh",
     "Model",
     "Note",
@@ -103,9 +113,11 @@ __all__ = [
     "handle_frames",
     "landmark_map",
     "load_map",
+    "load_match_model",
     "load_model",
     "map_dirichlet",
     "map_score",
+    "match",
     "nearest_map",
     "part_of_motion",
     "pose_error",
@@ -115,6 +127,7 @@ __all__ = [
     "reversed_map",
     "save_map",
     "set_thread_count",
+    "shipped_match_models",
     "shipped_models",
     "shrink_fit",
     "simd_level",
@@ -126,6 +139,7 @@ __all__ = [
     "transfer_groups",
     "transfer_shape_keys",
     "transfer_uvs",
+    "untrained_match_model",
     "uv_map",
     "vertex_inversion",
     "within_islands",

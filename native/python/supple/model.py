@@ -48,10 +48,7 @@ class Model:
 
     def save(self, path: str | os.PathLike) -> None:
         """Write a safetensors file; an existing one is replaced whole or not at all."""
-        path = Path(path)
-        partial = path.with_name(path.name + ".partial")
-        safetensors.numpy.save_file(self.tensors(), partial, metadata=self.metadata)
-        os.replace(partial, path)
+        write_tensors(path, self.tensors(), self.metadata)
 
 
 def from_tensors(tensors: dict[str, NDArray], metadata: dict[str, str]) -> Model:
@@ -89,7 +86,31 @@ def load_model(name_or_path: str | os.PathLike) -> Model:
     Raises:
         SuppleError: model_file: missing, truncated, not safetensors, or not a Supple network.
     """
-    shipped = shipped_models()
+    path, tensors, metadata = read_tensors(name_or_path, shipped_models(), FORMAT)
+    try:
+        return from_tensors(tensors, metadata)
+    except SuppleError as error:
+        raise SuppleError(error.code, f"{path}: {error}") from error
+
+
+def write_tensors(
+    path: str | os.PathLike, tensors: dict[str, NDArray], metadata: dict[str, str]
+) -> None:
+    """Write a safetensors file; an existing one is replaced whole or not at all."""
+    path = Path(path)
+    partial = path.with_name(path.name + ".partial")
+    safetensors.numpy.save_file(tensors, partial, metadata=metadata)
+    os.replace(partial, path)
+
+
+def read_tensors(
+    name_or_path: str | os.PathLike, shipped: dict[str, Path], wanted_format: str
+) -> tuple[Path, dict[str, NDArray], dict[str, str]]:
+    """Path, tensors and metadata of a shipped file or of one by path.
+
+    Raises:
+        SuppleError: model_file.
+    """
     path = shipped.get(str(name_or_path), Path(name_or_path))
     if not path.is_file():
         raise SuppleError(
@@ -107,12 +128,10 @@ def load_model(name_or_path: str | os.PathLike) -> Model:
             f"{path} cannot be read as a safetensors file ({error}). It may be cut short; "
             "copy it again.",
         ) from error
-    if metadata.get("format") != FORMAT:
+    if metadata.get("format") != wanted_format:
         raise SuppleError(
             "model_file",
-            f"{path} holds no Supple network (format '{metadata.get('format')}', not '{FORMAT}').",
+            f"{path} holds no Supple network of this kind (format '{metadata.get('format')}', not "
+            f"'{wanted_format}').",
         )
-    try:
-        return from_tensors(tensors, metadata)
-    except SuppleError as error:
-        raise SuppleError(error.code, f"{path}: {error}") from error
+    return path, tensors, metadata

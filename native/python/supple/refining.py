@@ -145,26 +145,33 @@ class Refiner:
             native = self._native.refine(initial.native, progress)
         else:
             native = self._native.refine(arrays.indices(initial, "initial"), progress)
-        report = native.report
-        return RefineResult(
-            native.point_map,
-            SurfaceMap._of(native.surface_map),
-            native.recovered,
-            native.confidence,
-            native.backward_point_map if self._backward else None,
-            SurfaceMap._of(native.backward_surface_map) if self._backward else None,
-            list(self.notes),
-            {
-                "rounds": report.rounds,
-                "eigenfunctions": report.eigenfunctions,
-                "network": report.network,
-                "signal_milliseconds": report.signal_milliseconds,
-                "network_milliseconds": report.network_milliseconds,
-                "recovery_milliseconds": report.recovery_milliseconds,
-                "nearest_milliseconds": report.nearest_milliseconds,
-                "milliseconds": report.total_milliseconds,
-            },
-        )
+        return refine_result(native, backward=self._backward, notes=self.notes)
+
+
+def refine_result(
+    native: _native.RefineResult, *, backward: bool, notes: Sequence[Note]
+) -> RefineResult:
+    """From the native result; backward: whether the way back was asked for."""
+    report = native.report
+    return RefineResult(
+        native.point_map,
+        SurfaceMap._of(native.surface_map),
+        native.recovered,
+        native.confidence,
+        native.backward_point_map if backward else None,
+        SurfaceMap._of(native.backward_surface_map) if backward else None,
+        list(notes),
+        {
+            "rounds": report.rounds,
+            "eigenfunctions": report.eigenfunctions,
+            "network": report.network,
+            "signal_milliseconds": report.signal_milliseconds,
+            "network_milliseconds": report.network_milliseconds,
+            "recovery_milliseconds": report.recovery_milliseconds,
+            "nearest_milliseconds": report.nearest_milliseconds,
+            "milliseconds": report.total_milliseconds,
+        },
+    )
 
 
 def refine(

@@ -2,6 +2,7 @@
 #include "supple/learning/joint_loss.h"
 
 #include <string>
+#include <utility>
 
 #include "supple/core/dense.h"
 #include "supple/core/error.h"
@@ -32,11 +33,11 @@ struct Deformation {
 template <class Scalar>
 JointSurface<Scalar>::JointSurface(const SurfaceOperators& operators, const Eigenbasis& basis,
                                    const FeatureArchitecture& architecture, int functions,
-                                   const NetworkContext<Scalar>* network_in)
+                                   std::shared_ptr<const NetworkContext<Scalar>> network_in)
     : features(operators, basis, architecture),
       match(operators, basis, function_count(basis, functions)),
       coarse(product(match.functions, match.coordinates)),
-      network(network_in) {}
+      network(std::move(network_in)) {}
 
 template <class Scalar>
 JointLossValues joint_loss(const JointNetworks<Scalar>& networks, const JointPair<Scalar>& pair,
@@ -88,8 +89,11 @@ JointLossValues joint_loss(const JointNetworks<Scalar>& networks, const JointPai
         LayerParameters<Scalar>::zeros(networks.jacobians->architecture().sizes());
   }
   for (size_t d = 0; deforms && d < 2; ++d) {
+    Signal of_signal;
     networks.jacobians->backward(*pair[d]->network, deformations[d].signal, deformations[d].trace,
-                                 of_loss.predicted[d], gradient->jacobians);
+                                 of_loss.predicted[d], gradient->jacobians, &of_signal);
+    of_loss.match[d].coarse = spectral_signal_backward(*pair[d]->match.operators, pair[d]->coarse,
+                                                       found[d].coarse, of_signal);
   }
   const FeaturePair of_features = match_backward(surfaces, features, found, of_loss.match, options,
                                                  progress.stage("derivatives", 0.5, 0.9));

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <optional>
 
 #include "supple/core/progress.h"
@@ -28,16 +29,16 @@ template <class Scalar>
 struct JointSurface {
   /// functions: of the functional maps and the signal, in [1, functions of the basis]; fewer where
   /// that would cut through a multiple eigenvalue. network: what the local Jacobian network needs
-  /// of this surface; nullptr without one. The arguments must outlive this.
+  /// of this surface; nullptr without one. The surface must outlive this.
   /// Errors: those of `MatchSurface` and `FeatureContext`.
   JointSurface(const SurfaceOperators& operators, const Eigenbasis& basis,
                const FeatureArchitecture& architecture, int functions,
-               const NetworkContext<Scalar>* network);
+               std::shared_ptr<const NetworkContext<Scalar>> network);
 
   FeatureContext<Scalar> features;
   MatchSurface match;
-  Points coarse;                          ///< n x 3, the surface's own vertices in its functions
-  const NetworkContext<Scalar>* network;  ///< not owned
+  Points coarse;  ///< n x 3, the surface's own vertices in its functions
+  std::shared_ptr<const NetworkContext<Scalar>> network;
 };
 template <class Scalar>
 using JointPair = std::array<const JointSurface<Scalar>*, 2>;

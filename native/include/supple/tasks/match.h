@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -58,8 +59,7 @@ struct MatchResult {
   RefineResult refined;
 };
 
-/// One pair, matched step by step so that callers can show how it goes. Not safe for several
-/// threads at a time.
+/// One pair. Not safe for several threads at a time.
 class Matcher {
  public:
   /// Errors: `bad_option` for options out of range or a mesh that is nullptr; those of
@@ -68,18 +68,19 @@ class Matcher {
           const MatchNetworks& networks, MatchOptions options = {}, ProgressRange progress = {});
   ~Matcher();
 
-  /// Whether adaptation is over.
-  bool finished() const;
-  /// The next epoch of it. Errors: those of `JointTrainer::epoch`.
-  const JointEpoch& epoch(ProgressRange progress = {});
-  const std::vector<JointEpoch>& history() const;
-  const MatchNetworks& networks() const;  ///< as adapted so far
+  /// Called after each epoch of adaptation; may ask for `features_map`. What it throws ends the
+  /// work.
+  using Watch = std::function<void(const JointEpoch&)>;
+  /// Adapts the networks to the pair, then refines the map of the features, or a more plausible
+  /// one, with the second network (or none). Goes on where a cancelled run left off.
+  /// Errors: those of `JointTrainer::epoch`.
+  MatchResult run(ProgressRange progress = {}, const Watch& watch = {});
+  const std::vector<JointEpoch>& history() const;  ///< of adaptation so far
+  const MatchNetworks& networks() const;           ///< as adapted so far
 
   /// What the features say now: the point map of the functional map of their soft map. The paper,
   /// Eqns 12 and 6.
   InitialMap features_map(ProgressRange progress = {}) const;
-  /// That map, or a more plausible one, refined with the second network (or none).
-  MatchResult result(ProgressRange progress = {}) const;
   /// Those of the refiner.
   const std::vector<Note>& notes() const;
 

@@ -24,7 +24,7 @@ std::shared_ptr<const JointSurface<float>> joint_surface(const PreparedMesh& mes
                                                          int functions) {
   return std::make_shared<const JointSurface<float>>(
       mesh.operators, mesh.basis, networks.features.architecture, functions,
-      networks.jacobians.has_value() ? mesh.context_for(networks.jacobians->architecture()).get()
+      networks.jacobians.has_value() ? mesh.context_for(networks.jacobians->architecture())
                                      : nullptr);
 }
 

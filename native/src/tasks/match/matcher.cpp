@@ -62,15 +62,6 @@ Matcher::Matcher(std::shared_ptr<const PreparedMesh> source,
 
 Matcher::~Matcher() = default;
 
-bool Matcher::finished() const { return !impl_->trainer.has_value() || impl_->trainer->finished(); }
-
-const JointEpoch& Matcher::epoch(ProgressRange progress) {
-  if (finished()) {
-    throw Error(ErrorCode::bad_option, "Adaptation to the pair is over.");
-  }
-  return impl_->trainer->epoch(progress);
-}
-
 const std::vector<JointEpoch>& Matcher::history() const {
   static const std::vector<JointEpoch> none;
   return impl_->trainer.has_value() ? impl_->trainer->history() : none;
@@ -90,12 +81,22 @@ InitialMap Matcher::features_map(ProgressRange progress) const {
       .finished(found[0].soft_map, progress.stage("finding vertices", 0.8, 1.0));
 }
 
-MatchResult Matcher::result(ProgressRange progress) const {
+MatchResult Matcher::run(ProgressRange progress, const Watch& watch) {
+  const ProgressRange adapting = progress.stage("adapting to the pair", 0.0, 0.8);
+  const double epochs = impl_->options.training.epochs;
+  while (impl_->trainer.has_value() && !impl_->trainer->finished()) {
+    const auto done = static_cast<double>(history().size());
+    const JointEpoch& epoch = impl_->trainer->epoch(
+        adapting.stage("adapting to the pair", done / epochs, (done + 1.0) / epochs));
+    if (watch) {
+      watch(epoch);
+    }
+  }
   MatchResult result;
-  result.initial = features_map(progress.stage("comparing features", 0.0, 0.3));
+  result.initial = features_map(progress.stage("comparing features", 0.8, 0.85));
   if (impl_->options.automatic) {
     InitialMap other = automatic_map(*impl_->source, *impl_->target,
-                                     progress.stage("looking for other maps", 0.3, 0.7));
+                                     progress.stage("looking for other maps", 0.85, 0.95));
     if (other.score.value() > result.initial.score.value()) {
       result.initial = std::move(other);
       result.automatic = true;
@@ -103,7 +104,7 @@ MatchResult Matcher::result(ProgressRange progress) const {
   }
   const Refiner refiner(impl_->source, impl_->target, refining_network(impl_->now()),
                         impl_->options.refine);
-  result.refined = refiner.refine(result.initial.point_map, progress.stage("refining", 0.7, 1.0));
+  result.refined = refiner.refine(result.initial.point_map, progress.stage("refining", 0.95, 1.0));
   return result;
 }
 
