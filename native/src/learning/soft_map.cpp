@@ -20,9 +20,9 @@
 namespace supple {
 namespace {
 
-// Rows of surface 0 and of surface 1 in a tile: it and the products made of it stay in the
-// second-level cache, and BLAS is near its best.
-constexpr std::array<Eigen::Index, 2> kTileRows = {256, 512};
+// Rows of either surface in a tile, at most: what is made of it stays in the second-level cache
+// from one step to the next, and BLAS is near its best.
+constexpr Eigen::Index kTileRows = 512;
 // Weights of at least e^-kReach leave room for what they are divided by and multiplied with.
 template <class Scalar>
 constexpr double kReach = sizeof(Scalar) == sizeof(float) ? 60.0 : 600.0;
@@ -174,7 +174,7 @@ SoftMapPair<Scalar>::SoftMapPair(const RowMatrix<Scalar>& first, const RowMatrix
             .template cast<Scalar>();
     // As many for each thread, so that none waits for another.
     const Eigen::Index each = s == 0 ? thread_count() : 1;
-    const Eigen::Index count = (unit.rows() + each * kTileRows[s] - 1) / (each * kTileRows[s]);
+    const Eigen::Index count = (unit.rows() + each * kTileRows - 1) / (each * kTileRows);
     features_[s] = cut(unit, static_cast<size_t>(std::min(count * each, unit.rows())));
   }
   if (!one_weight_) {

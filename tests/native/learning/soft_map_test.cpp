@@ -84,9 +84,9 @@ Pair gradient_of(const SoftMapPair<Scalar>& maps, const Pair& values, const Pair
 
 // Of more rows than a tile has, and of another number of columns on each surface.
 struct Large {
-  Pair features{test::noise(300, 24, 1), test::noise(700, 24, 2)};
-  Pair values{test::noise(300, 5, 3), test::noise(700, 7, 4)};
-  Pair grad{test::noise(300, 7, 5), test::noise(700, 5, 6)};
+  Pair features{test::noise(520, 24, 1), test::noise(530, 24, 2)};
+  Pair values{test::noise(520, 5, 3), test::noise(530, 7, 4)};
+  Pair grad{test::noise(520, 7, 5), test::noise(530, 5, 6)};
 };
 
 TEST(SoftMapPair, IsTheSoftmaxOfTheProductsInBothDirections) {

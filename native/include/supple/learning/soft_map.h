@@ -18,7 +18,7 @@ namespace supple {
 /// weights of all target vertices, sum 1. float or double.
 ///
 /// Nothing of n_0 x n_1 is stored. Tiles of the products are computed, used for both directions and
-/// forgotten: a call takes three tiles (2^17 numbers each) a thread and, a thread, sums of the size
+/// forgotten: a call takes three tiles (2^18 numbers each) a thread and, a thread, sums of the size
 /// of what it returns for surface 1, besides the features and what it is given once more. Threads
 /// share the rows of surface 0, each with a BLAS of its own. The same bytes for the same number of
 /// threads.
@@ -28,7 +28,10 @@ namespace supple {
 /// for double. Below it, every row and every column has its largest product taken off first, which
 /// takes the products once more and two exponentials.
 ///
-/// float: a product is good to about 1e-7, and a weight to that part of the temperature.
+/// float: products are good to about 1e-7 and weights to that part of the temperature, about 2e-6
+/// at 0.07. The gradient of a row f is good to 2e-6 |G| |X| / (temperature |f|), G a row of
+/// gradients and X one of values: where weights are as good as hard and derivatives all but vanish,
+/// little more than this error is left of them.
 /// Source: the paper, Eqn 12; rows of length 1 as in Cao et al. 2023 (ULRSSM).
 template <class Scalar>
 class SoftMapPair {
