@@ -10,14 +10,14 @@ namespace {
 struct LossOfPair {
   Match match;
   UnsupervisedLossValues values;
-  FeaturePair grad_features;
+  FeaturePair<double> grad_features;
   std::array<MatrixField, 2> grad_predicted;
 };
 
 LossOfPair loss_of_pair(const PreparedMesh& first, const PreparedMesh& second,
-                        const FeaturePair& features, const std::array<MatrixField, 2>& predicted,
-                        Eigen::Index functions, const UnsupervisedOptions& options,
-                        Progress* progress) {
+                        const FeaturePair<double>& features,
+                        const std::array<MatrixField, 2>& predicted, Eigen::Index functions,
+                        const UnsupervisedOptions& options, Progress* progress) {
   const MatchSurface a(first.operators, first.basis, functions);
   const MatchSurface b(second.operators, second.basis, functions);
   const SurfacePair pair = {&a, &b};
@@ -34,18 +34,24 @@ LossOfPair loss_of_pair(const PreparedMesh& first, const PreparedMesh& second,
 }  // namespace
 
 void bind_unsupervised(py::module_& module) {
+  // From the first features' surface to the second's.
+  using SoftMap = SoftMapPair<double>;
   py::class_<SoftMap>(module, "SoftMap")
-      .def(py::init<const RowMatrix<double>&, const RowMatrix<double>&, double>(),
-           py::arg("source"), py::arg("target"), py::arg("temperature") = 0.07, NoGil())
+      .def(py::init([](const RowMatrix<double>& source, const RowMatrix<double>& target,
+                       double temperature, Progress* progress) {
+             return SoftMap(source, target, temperature, range(progress));
+           }),
+           py::arg("source"), py::arg("target"), py::arg("temperature") = 0.07,
+           py::arg("progress") = nullptr, NoGil())
       .def(
           "apply",
           [](const SoftMap& map, const RowMatrix<double>& values, Progress* progress) {
-            return map.apply(values, range(progress));
+            return map.apply({RowMatrix<double>(), values}, range(progress))[0].values;
           },
           py::arg("values"), py::arg("progress") = nullptr, NoGil())
       .def(
           "hard_map",
-          [](const SoftMap& map, Progress* progress) { return map.hard_map(range(progress)); },
+          [](const SoftMap& map, Progress* progress) { return map.hard_map(0, range(progress)); },
           py::arg("progress") = nullptr, NoGil());
 
   py::class_<UnsupervisedOptions>(module, "UnsupervisedOptions")

@@ -349,6 +349,7 @@ class SoftMap:
         source: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
         target: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
         temperature: typing.SupportsFloat | typing.SupportsIndex = 0.07,
+        progress: Progress = None,
     ) -> None: ...
     def apply(
         self,

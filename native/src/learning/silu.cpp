@@ -2,35 +2,13 @@
 #include "supple/learning/silu.h"
 
 #include <cmath>
-#include <cstdint>
 #include <cstring>
 
+#include "exponential.h"
 #include "supple/core/simd.h"
 
 namespace supple {
 namespace {
-
-// exp of each lane, |x| <= 87: 2^k times a polynomial on |r| <= ln(2) / 2 (Cody and Waite 1980).
-// By reference: a vector passed by value has another ABI for each instruction set.
-template <int Bytes, class V>
-SUPPLE_INLINE void exponential(V& x) {
-  using I = typename Lanes<int32_t, Bytes>::type;
-  const V limit = V{} + 87.0f;
-  x = x > limit ? limit : x;
-  x = x < -limit ? -limit : x;
-  // Adding 1.5 * 2^23 rounds to the nearest whole number.
-  const V magic = V{} + 12582912.0f;
-  const V k = (x * 1.44269504f + magic) - magic;
-  const V r = (x - k * 0.693359375f) + k * 2.12194440e-4f;
-  V p = r * 1.9875691500e-4f + 1.3981999507e-3f;
-  p = p * r + 8.3334519073e-3f;
-  p = p * r + 4.1665795894e-2f;
-  p = p * r + 1.6666665459e-1f;
-  p = p * r + 5.0000001201e-1f;
-  p = p * (r * r) + r + 1.0f;
-  const I bits = (__builtin_convertvector(k, I) + 127) << 23;
-  x = p * reinterpret_cast<V>(bits);
-}
 
 // Calls step(i, bytes) for each vector of a row; all bytes of one but at the end.
 template <int Bytes, class Step>

@@ -19,7 +19,8 @@ RowMatrix<double> transposed_times(const RowMatrix<double>& a, const RowMatrix<d
   return tall_product<double>({a}, b);
 }
 
-void check_features(const SurfacePair& surfaces, const FeaturePair& features) {
+template <class Scalar>
+void check_features(const SurfacePair& surfaces, const FeaturePair<Scalar>& features) {
   for (size_t d = 0; d < 2; ++d) {
     const Eigen::Index n = surfaces[d]->functions.rows();
     if (features[d].rows() != n || features[d].cols() != features[0].cols()) {
@@ -59,9 +60,26 @@ void check_match(const SurfacePair& surfaces, const Match& match, bool as_gradie
   }
 }
 
-// Gradient with respect to what the soft map P of direction d pulled back, n_s x (k_t + 3).
+// Phi^+ F, k x c, of each surface.
+template <class Scalar>
+std::array<RowMatrix<double>, 2> coefficients_of(const SurfacePair& surfaces,
+                                                 const FeaturePair<Scalar>& features) {
+  return {transposed_times(surfaces[0]->weighted, features[0].template cast<double>()),
+          transposed_times(surfaces[1]->weighted, features[1].template cast<double>())};
+}
+
+template <class Scalar>
+typename SoftMapPair<Scalar>::Both carried_by(const SurfacePair& surfaces) {
+  return {surfaces[0]->carried.cast<Scalar>(), surfaces[1]->carried.cast<Scalar>()};
+}
+
+// Gradient with respect to what the soft map P of direction d pulled back, n_s x (k_t + 3), or of
+// 0 rows where it is 0.
 RowMatrix<double> grad_of_carried(const MatchSurface& source, const MatchSurface& target,
                                   const MatchDirection& gradient) {
+  if (gradient.soft_map.rows() == 0 && gradient.pulled.rows() == 0 && gradient.coarse.rows() == 0) {
+    return {};
+  }
   const Eigen::Index k = target.values.size();
   RowMatrix<double> of_map = RowMatrix<double>::Zero(source.values.size(), k);
   if (gradient.soft_map.rows() > 0) {
@@ -104,37 +122,47 @@ MatchSurface::MatchSurface(const SurfaceOperators& operators_in, const Eigenbasi
   adjacency = face_adjacency(operators->faces, operators->corners);
 }
 
-Match match(const SurfacePair& surfaces, const FeaturePair& features,
+template <class Scalar>
+Match match(const SurfacePair& surfaces, const FeaturePair<Scalar>& features,
             const UnsupervisedOptions& options, ProgressRange progress) {
   check_features(surfaces, features);
-  const FeaturePair coefficients = {transposed_times(surfaces[0]->weighted, features[0]),
-                                    transposed_times(surfaces[1]->weighted, features[1])};
+  const std::array<RowMatrix<double>, 2> coefficients = coefficients_of(surfaces, features);
   Match result;
+  for (size_t d = 0; d < 2; ++d) {
+    result[d].map =
+        feature_map(coefficients[d], coefficients[1 - d],
+                    map_penalties(surfaces[d]->values, surfaces[1 - d]->values, options.map));
+  }
+  const SoftMapPair<Scalar> soft(features[0], features[1], options.temperature,
+                                 progress.stage("soft map", 0.0, 0.3));
+  const auto pulled =
+      soft.apply(carried_by<Scalar>(surfaces), progress.stage("soft map", 0.3, 1.0));
   for (size_t d = 0; d < 2; ++d) {
     const MatchSurface &source = *surfaces[d], &target = *surfaces[1 - d];
     MatchDirection& direction = result[d];
-    direction.map = feature_map(coefficients[d], coefficients[1 - d],
-                                map_penalties(source.values, target.values, options.map));
-    const SoftMap soft(features[d], features[1 - d], options.temperature);
-    const RowMatrix<double> pulled = soft.apply(
-        target.carried,
-        progress.stage("soft map", 0.5 * static_cast<double>(d), 0.5 * static_cast<double>(d + 1)));
-    direction.soft_map = transposed_times(source.weighted, pulled.leftCols(target.values.size()));
-    direction.pulled = pulled.rightCols<3>();
+    direction.carried = pulled[d].values.template cast<double>();
+    direction.sums = pulled[d].sums.template cast<double>();
+    direction.soft_map =
+        transposed_times(source.weighted, direction.carried.leftCols(target.values.size()));
+    direction.pulled = direction.carried.rightCols<3>();
     direction.coarse = product(source.functions, product(direction.soft_map, target.coordinates));
   }
   return result;
 }
 
-FeaturePair match_backward(const SurfacePair& surfaces, const FeaturePair& features,
-                           const Match& forward, const Match& gradient,
-                           const UnsupervisedOptions& options, ProgressRange progress) {
+template <class Scalar>
+FeaturePair<Scalar> match_backward(const SurfacePair& surfaces, const FeaturePair<Scalar>& features,
+                                   const Match& forward, const Match& gradient,
+                                   const UnsupervisedOptions& options, ProgressRange progress) {
   check_features(surfaces, features);
   check_match(surfaces, gradient, true);
-  const FeaturePair coefficients = {transposed_times(surfaces[0]->weighted, features[0]),
-                                    transposed_times(surfaces[1]->weighted, features[1])};
-  FeaturePair result = {RowMatrix<double>::Zero(features[0].rows(), features[0].cols()),
-                        RowMatrix<double>::Zero(features[1].rows(), features[1].cols())};
+  const std::array<RowMatrix<double>, 2> coefficients = coefficients_of(surfaces, features);
+  std::array<RowMatrix<double>, 2> of_coefficients;
+  for (size_t s = 0; s < 2; ++s) {
+    of_coefficients[s].setZero(coefficients[s].rows(), coefficients[s].cols());
+  }
+  FeaturePair<Scalar> of_carried;
+  std::array<typename SoftMapPair<Scalar>::Pulled, 2> pulled;
   for (size_t d = 0; d < 2; ++d) {
     const MatchSurface &source = *surfaces[d], &target = *surfaces[1 - d];
     if (gradient[d].map.rows() > 0) {
@@ -142,19 +170,34 @@ FeaturePair match_backward(const SurfacePair& surfaces, const FeaturePair& featu
           feature_map_backward(coefficients[d], coefficients[1 - d],
                                map_penalties(source.values, target.values, options.map),
                                forward[d].map, gradient[d].map);
-      gemm(1.0, source.weighted, Op::none, of_map.source, Op::none, 1.0, result[d]);
-      gemm(1.0, target.weighted, Op::none, of_map.target, Op::none, 1.0, result[1 - d]);
+      of_coefficients[d] += of_map.source;
+      of_coefficients[1 - d] += of_map.target;
     }
-    const SoftMap soft(features[d], features[1 - d], options.temperature);
-    const SoftMap::Gradient of_soft =
-        soft.backward(target.carried, grad_of_carried(source, target, gradient[d]),
-                      progress.stage("derivative of the soft map", 0.5 * static_cast<double>(d),
-                                     0.5 * static_cast<double>(d + 1)));
-    result[d] += of_soft.source;
-    result[1 - d] += of_soft.target;
+    of_carried[d] = grad_of_carried(source, target, gradient[d]).template cast<Scalar>();
+    pulled[d] = {forward[d].carried.template cast<Scalar>(),
+                 forward[d].sums.template cast<Scalar>()};
+  }
+  const SoftMapPair<Scalar> soft(features[0], features[1], options.temperature,
+                                 progress.stage("derivative of the soft map", 0.0, 0.2));
+  FeaturePair<Scalar> result =
+      soft.backward(carried_by<Scalar>(surfaces), pulled, of_carried,
+                    progress.stage("derivative of the soft map", 0.2, 1.0));
+  for (size_t s = 0; s < 2; ++s) {
+    result[s] += product(surfaces[s]->weighted, of_coefficients[s]).template cast<Scalar>();
   }
   return result;
 }
+
+template Match match(const SurfacePair&, const FeaturePair<float>&, const UnsupervisedOptions&,
+                     ProgressRange);
+template Match match(const SurfacePair&, const FeaturePair<double>&, const UnsupervisedOptions&,
+                     ProgressRange);
+template FeaturePair<float> match_backward(const SurfacePair&, const FeaturePair<float>&,
+                                           const Match&, const Match&, const UnsupervisedOptions&,
+                                           ProgressRange);
+template FeaturePair<double> match_backward(const SurfacePair&, const FeaturePair<double>&,
+                                            const Match&, const Match&, const UnsupervisedOptions&,
+                                            ProgressRange);
 
 UnsupervisedLossValues unsupervised_loss(const SurfacePair& surfaces, const Match& match,
                                          const std::array<MatrixField, 2>& predicted,

@@ -176,7 +176,7 @@ class UnsupervisedLoss : public ::testing::Test {
   test::Threads threads{1};  // far too small to share
   Surface first, second;
   SurfacePair pair;
-  FeaturePair features;
+  FeaturePair<double> features;
   std::array<MatrixField, 2> predicted;
   UnsupervisedOptions options;
 };
@@ -185,7 +185,8 @@ TEST_F(UnsupervisedLoss, Gradient) {
   const Match forward = match(pair, features, options);
   UnsupervisedLossGradient gradient;
   unsupervised_loss(pair, forward, predicted, options, &gradient);
-  const FeaturePair of_features = match_backward(pair, features, forward, gradient.match, options);
+  const FeaturePair<double> of_features =
+      match_backward(pair, features, forward, gradient.match, options);
   for (size_t d = 0; d < 2; ++d) {
     EXPECT_TRUE(test::gradient_matches([&] { return total(); }, test::values_of(predicted[d]),
                                        test::values_of(std::as_const(gradient.predicted[d])), 40));
@@ -215,7 +216,7 @@ TEST_F(UnsupervisedLoss, GradientOfEveryOutputOfTheMatch) {
     }
     return sum;
   };
-  const FeaturePair gradient = match_backward(pair, features, forward, direction, options);
+  const FeaturePair<double> gradient = match_backward(pair, features, forward, direction, options);
   for (size_t d = 0; d < 2; ++d) {
     EXPECT_TRUE(test::gradient_matches(value, test::values_of(features[d]),
                                        test::values_of(gradient[d]), 60));
@@ -226,6 +227,27 @@ TEST_F(UnsupervisedLoss, EmptyGradientsAreZero) {
   const Match forward = match(pair, features, options);
   for (const RowMatrix<double>& grad : match_backward(pair, features, forward, {}, options)) {
     EXPECT_TRUE(grad.isZero());
+  }
+}
+
+// Soft maps of float features; at this temperature their weights are good to about 1e-6.
+TEST_F(UnsupervisedLoss, SinglePrecisionFeaturesGiveTheSame) {
+  const FeaturePair<float> single = {features[0].cast<float>(), features[1].cast<float>()};
+  features = {single[0].cast<double>(), single[1].cast<double>()};
+  const Match forward = match(pair, features, options), rough = match(pair, single, options);
+  for (size_t d = 0; d < 2; ++d) {
+    EXPECT_EQ(rough[d].map, forward[d].map);
+    EXPECT_LT((rough[d].soft_map - forward[d].soft_map).norm(), 1e-5 * forward[d].soft_map.norm());
+    EXPECT_LT(test::farthest(rough[d].pulled, forward[d].pulled), 1e-5);
+    EXPECT_LT(test::farthest(rough[d].coarse, forward[d].coarse), 1e-5);
+  }
+  UnsupervisedLossGradient gradient;
+  unsupervised_loss(pair, forward, predicted, options, &gradient);
+  const FeaturePair<double> truth =
+      match_backward(pair, features, forward, gradient.match, options);
+  const FeaturePair<float> actual = match_backward(pair, single, rough, gradient.match, options);
+  for (size_t d = 0; d < 2; ++d) {
+    EXPECT_LT((actual[d].cast<double>() - truth[d]).norm(), 1e-5 * truth[d].norm());
   }
 }
 
@@ -282,7 +304,7 @@ TEST_F(UnsupervisedLoss, SameThreadsSameBytes) {
     unsupervised_loss(pair, forward, predicted, options, &gradient);
     return match_backward(pair, features, forward, gradient.match, options);
   };
-  const FeaturePair a = run(), b = run();
+  const FeaturePair<double> a = run(), b = run();
   EXPECT_EQ(a[0], b[0]);
   EXPECT_EQ(a[1], b[1]);
 }
@@ -293,12 +315,20 @@ TEST_F(UnsupervisedLoss, RefusesWhatDoesNotFit) {
   EXPECT_TRUE(test::fails_with(ErrorCode::wrong_shape, {"42", "12"},
                                [&] { MatchSurface(first.operators, second.basis, 5); }));
   EXPECT_TRUE(test::fails_with(ErrorCode::wrong_shape, {"Surface 1", "41 x 8", "42 x 8"}, [&] {
-    match(pair, {features[0], features[1].topRows(41)}, options);
+    match<double>(pair, {features[0], features[1].topRows(41)}, options);
   }));
   Match forward = match(pair, features, options);
   forward[1].pulled = Points::Zero(3, 3);
   EXPECT_TRUE(test::fails_with(ErrorCode::wrong_shape, {"Direction 1", "pulled"},
                                [&] { unsupervised_loss(pair, forward, predicted, options); }));
+  // Without what `match` kept for the way back.
+  Match stripped = match(pair, features, options);
+  Match gradient;
+  gradient[1].pulled = stripped[1].pulled;
+  stripped[1].carried.resize(0, 0);
+  EXPECT_TRUE(test::fails_with(ErrorCode::wrong_shape, {"pulled back", "surface 1"}, [&] {
+    match_backward(pair, features, stripped, gradient, options);
+  }));
   Progress cancelled;
   cancelled.cancel();
   EXPECT_TRUE(test::fails_with(ErrorCode::cancelled, {},
@@ -313,7 +343,7 @@ TEST(UnsupervisedLossAtTheTruth, AllTermsVanishForTheSameShapeInAnotherOrder) {
   UnsupervisedOptions options;
   options.temperature = 1e-3;  // as good as a permutation
   options.bijectivity = 1.0;
-  const FeaturePair both = {features, features.colwise().reverse()};
+  const FeaturePair<double> both = {features, features.colwise().reverse()};
   const Match forward = match(pair, both, options);
   // The functional map of the permutation: the same functions, up to their signs.
   for (size_t d = 0; d < 2; ++d) {
@@ -340,9 +370,10 @@ TEST(UnsupervisedLossAtTheTruth, AllTermsVanishForTheSameShapeInAnotherOrder) {
   EXPECT_LT(loss.bijectivity, 1e-10);
   EXPECT_LT(loss.total, 1e-9);
   // And a wrong map costs.
-  EXPECT_GT(
-      unsupervised_loss(pair, match(pair, {features, features}, options), predicted, options).total,
-      1.0);
+  EXPECT_GT(unsupervised_loss(pair, match<double>(pair, {features, features}, options), predicted,
+                              options)
+                .total,
+            1.0);
 }
 
 }  // namespace

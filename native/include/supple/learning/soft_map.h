@@ -2,57 +2,87 @@
 // Soft maps between two surfaces from features at their vertices, with derivatives.
 #pragma once
 
+#include <array>
+#include <vector>
+
 #include "supple/core/progress.h"
 #include "supple/core/types.h"
 
 namespace supple {
 
-/// P = softmax of F1 F2^T / temperature along each row, n1 x n2, F1 and F2 features of which every
-/// row is divided by its length: for each source vertex, weights of all target vertices, sum 1.
-/// P is never stored. Whatever needs it computes some rows at a time and forgets them: each call
-/// takes at most two blocks of `block_rows` x n2 numbers (2^20 of them or one row, 8 MB) besides
-/// what it is given and returns. The same bytes for the same number of threads.
+/// The soft maps between two surfaces, both directions, from features F_0 (n_0 x c) and F_1
+/// (n_1 x c), of which every row is divided by its length:
+///   P_0 = softmax of F_0 F_1^T / temperature along each row, n_0 x n_1,
+///   P_1 = softmax of F_1 F_0^T / temperature along each row, n_1 x n_0:
+/// direction d has surface d for its source and the other for its target; for each source vertex,
+/// weights of all target vertices, sum 1. float or double.
+///
+/// Nothing of n_0 x n_1 is stored. Tiles of the products are computed, used for both directions and
+/// forgotten: a call takes three tiles (2^18 numbers each) a thread and, a thread, sums of the size
+/// of what it returns for surface 1, besides the features and what it is given once more. Threads
+/// share the rows of surface 0, each with a BLAS of its own. The same bytes for the same number of
+/// threads.
+///
+/// Rows of length 1 have products of at most 1, so one exp((F_0 F_1^T - 1) / temperature) serves
+/// both directions as long as none of it vanishes: down to a temperature of 1/30 for float, 1/300
+/// for double. Below it, every row and every column has its largest product taken off first, which
+/// takes the products once more and two exponentials.
+///
+/// float: products are good to about 1e-7 and weights to that part of the temperature, about 2e-6
+/// at 0.07. The gradient of a row f is good to 2e-6 |G| |X| / (temperature |f|), G a row of
+/// gradients and X one of values: where weights are as good as hard and derivatives all but vanish,
+/// little more than this error is left of them.
 /// Source: the paper, Eqn 12; rows of length 1 as in Cao et al. 2023 (ULRSSM).
-class SoftMap {
+template <class Scalar>
+class SoftMapPair {
  public:
-  /// source: F1, n1 x c; target: F2, n2 x c; temperature > 0.
-  /// Errors: `wrong_shape`; `not_finite`, also for a row of zeros; `bad_option`.
-  SoftMap(const RowMatrix<double>& source, const RowMatrix<double>& target,
-          double temperature = 0.07);
+  /// Of surfaces 0 and 1.
+  using Both = std::array<RowMatrix<Scalar>, 2>;
+  using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
 
-  /// P X, n1 x k, of X (n2 x k). Errors: `wrong_shape`; `cancelled`.
-  RowMatrix<double> apply(const RowMatrix<double>& values, ProgressRange progress = {}) const;
-  /// P^T G, n2 x k: the gradient with respect to X from that with respect to P X (n1 x k).
-  /// Errors: `wrong_shape`; `cancelled`.
-  RowMatrix<double> apply_backward(const RowMatrix<double>& grad,
-                                   ProgressRange progress = {}) const;
+  /// temperature > 0. Errors: `wrong_shape`; `not_finite`, also for a row of zeros; `bad_option`;
+  /// `cancelled`.
+  SoftMapPair(const RowMatrix<Scalar>& first, const RowMatrix<Scalar>& second,
+              double temperature = 0.07, ProgressRange progress = {});
 
-  /// Gradients with respect to the features as they were given, before the division.
-  struct Gradient {
-    RowMatrix<double> source;  ///< n1 x c
-    RowMatrix<double> target;  ///< n2 x c
+  /// What a direction d pulled back.
+  struct Pulled {
+    RowMatrix<Scalar> values;  ///< n_d x k, P_d X
+    Vector sums;               ///< n_d: what its rows were divided by; `backward` asks for it
   };
-  /// From the gradient with respect to P X (n1 x k). Errors: `wrong_shape`; `cancelled`.
-  Gradient backward(const RowMatrix<double>& values, const RowMatrix<double>& grad,
-                    ProgressRange progress = {}) const;
+  /// P_0 X_1 and P_1 X_0 of values X_d, n_d x k_d. Values of 0 rows leave out the direction that
+  /// would pull them back; what it pulled is empty. Errors: `wrong_shape`, also for no values at
+  /// all; `cancelled`.
+  std::array<Pulled, 2> apply(const Both& values, ProgressRange progress = {}) const;
 
-  /// n1: the target vertex of the largest weight. Ties to the lowest index.
+  /// Gradients with respect to both features as they were given, before the division, from those
+  /// with respect to what `apply` pulled for the same values, n_d x k_(1-d). A gradient of 0 rows
+  /// is 0. Errors: `wrong_shape`; `cancelled`.
+  Both backward(const Both& values, const std::array<Pulled, 2>& pulled, const Both& grad,
+                ProgressRange progress = {}) const;
+
+  /// n_d: the target vertex of the largest weight. Ties to the lowest index. direction: 0 or 1.
   /// Errors: those of `nearest_rows`.
-  Eigen::VectorXi hard_map(ProgressRange progress = {}) const;
+  Eigen::VectorXi hard_map(size_t direction, ProgressRange progress = {}) const;
 
-  Eigen::Index rows() const { return source_.rows(); }
-  Eigen::Index cols() const { return target_.rows(); }
-  Eigen::Index block_rows() const { return block_rows_; }
+  Eigen::Index rows(size_t surface) const { return lengths_[surface].size(); }
 
  private:
-  RowMatrix<double> rows_of_map(const RowMatrix<double>& source) const;
-  template <class Step>
-  void over_blocks(const ProgressRange& progress, const Step& step) const;
+  // Some neighbouring rows each.
+  using Tiles = std::vector<RowMatrix<Scalar>>;
+  struct Tile;
 
-  RowMatrix<double> source_, target_;              // rows of length 1
-  Eigen::VectorXd source_length_, target_length_;  // what they were divided by
-  double temperature_;
-  Eigen::Index block_rows_;
+  template <class Step>
+  void over_tiles(const ProgressRange& progress, const Step& step) const;
+  void find_largest(const ProgressRange& progress);
+  void weigh(Tile& tile, size_t direction) const;
+  size_t parts() const;
+
+  Scalar temperature_;
+  bool one_weight_;                         // one exponential serves both directions
+  std::array<Tiles, 2> features_;           // rows of length 1
+  std::array<Eigen::VectorXd, 2> lengths_;  // what they were divided by
+  std::array<Tiles, 2> largest_;  // n_d x 1: largest product of each row, of each column; or empty
 };
 
 }  // namespace supple

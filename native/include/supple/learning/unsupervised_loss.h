@@ -54,21 +54,29 @@ struct MatchDirection {
   RowMatrix<double> soft_map;  ///< C', k_s x k_t, Phi_s^+ P Phi_t of their soft map P. Eqn 12
   Points pulled;               ///< n_s x 3, P V_t
   Points coarse;               ///< n_s x 3, Phi_s C' Phi_t^+ V_t: the networks' signal. Eqn 10
+  /// What `match_backward` asks for besides; of no use in a gradient.
+  RowMatrix<double> carried{};  ///< n_s x (k_t + 3), P of what the target carries
+  Eigen::VectorXd sums{};       ///< n_s: what the rows of P were divided by
 };
 using Match = std::array<MatchDirection, 2>;
-/// n_d x c features of each surface.
-using FeaturePair = std::array<RowMatrix<double>, 2>;
+/// n_d x c features of each surface, float or double: what the soft maps are computed in. The
+/// functional maps, and all that is returned but gradients, are double.
+template <class Scalar>
+using FeaturePair = std::array<RowMatrix<Scalar>, 2>;
 
 /// What the features say of the pair, in surface units.
-/// Errors: those of `SoftMap`, `map_penalties` and `feature_map`; `wrong_shape`; `cancelled`.
-Match match(const SurfacePair& surfaces, const FeaturePair& features,
+/// Errors: those of `SoftMapPair`, `map_penalties` and `feature_map`; `wrong_shape`; `cancelled`.
+template <class Scalar>
+Match match(const SurfacePair& surfaces, const FeaturePair<Scalar>& features,
             const UnsupervisedOptions& options = {}, ProgressRange progress = {});
 
 /// Gradients with respect to both surfaces' features from those with respect to what `match`
-/// returned for the same arguments. Errors: those of `match`.
-FeaturePair match_backward(const SurfacePair& surfaces, const FeaturePair& features,
-                           const Match& forward, const Match& gradient,
-                           const UnsupervisedOptions& options = {}, ProgressRange progress = {});
+/// returned for the same arguments, `forward`. Errors: those of `match`.
+template <class Scalar>
+FeaturePair<Scalar> match_backward(const SurfacePair& surfaces, const FeaturePair<Scalar>& features,
+                                   const Match& forward, const Match& gradient,
+                                   const UnsupervisedOptions& options = {},
+                                   ProgressRange progress = {});
 
 /// The terms before weighting, both directions together, and their weighted sum.
 struct UnsupervisedLossValues {
