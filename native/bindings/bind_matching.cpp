@@ -30,12 +30,12 @@ struct MeshTrainer {
   JointTrainer trainer;
 };
 
-JointEpoch joint_epoch(int epoch, int pairs, double guide, double guide_weight,
+JointEpoch joint_epoch(int epoch, int pairs, double guide, double guide_share,
                        const std::array<double, 7>& terms) {
   JointEpoch result;
   result.epoch = epoch;
   result.pairs = pairs;
-  result.guide_weight = guide_weight;
+  result.guide_share = guide_share;
   result.loss.guide = guide;
   result.loss.terms = {terms[0], terms[1], terms[2], terms[3], terms[4], terms[5], terms[6]};
   return result;
@@ -125,10 +125,10 @@ void bind_matching(py::module_& module) {
 
   py::class_<JointEpoch>(module, "JointEpoch")
       .def(py::init(&joint_epoch), py::arg("epoch"), py::arg("pairs"), py::arg("guide"),
-           py::arg("guide_weight"), py::arg("terms"))
+           py::arg("guide_share"), py::arg("terms"))
       .def_readonly("epoch", &JointEpoch::epoch)
       .def_readonly("pairs", &JointEpoch::pairs)
-      .def_readonly("guide_weight", &JointEpoch::guide_weight)
+      .def_readonly("guide_share", &JointEpoch::guide_share)
       .def_property_readonly("guide", [](const JointEpoch& e) { return e.loss.guide; })
       .def_property_readonly("terms", [](const JointEpoch& e) {
         const UnsupervisedLossValues& t = e.loss.terms;

@@ -38,20 +38,20 @@ class Epoch:
         epoch: from 0.
         pairs: how many.
         loss: the terms by name (TERMS).
-        guide, guide_weight: how far soft maps are from the guides, and the weight of that; 0
-            without guides.
+        guide, guide_share: how far soft maps are from the guides, and the share of that in what is
+            minimised; 0 without guides.
     """
 
     epoch: int
     pairs: int
     loss: dict[str, float]
     guide: float = 0.0
-    guide_weight: float = 0.0
+    guide_share: float = 0.0
 
 
 def epoch_of(native: _native.JointEpoch) -> Epoch:
     terms = dict(zip(TERMS, native.terms, strict=True))
-    return Epoch(native.epoch, native.pairs, terms, native.guide, native.guide_weight)
+    return Epoch(native.epoch, native.pairs, terms, native.guide, native.guide_share)
 
 
 @dataclass

@@ -46,14 +46,14 @@ JointLossValues joint_loss(const JointNetworks<Scalar>& networks, const JointPai
   const SurfacePair surfaces = {&pair[0]->match, &pair[1]->match};
   const bool deforms = networks.jacobians.has_value() && options.jacobians.any();
   std::array<DiffusionTrace<Scalar>, 2> traces;
-  FeaturePair features;
+  FeaturePair<Scalar> features;
   for (size_t d = 0; d < 2; ++d) {
     features[d] =
-        networks.features.features(pair[d]->features, gradient != nullptr ? &traces[d] : nullptr)
-            .template cast<double>();
+        networks.features.features(pair[d]->features, gradient != nullptr ? &traces[d] : nullptr);
     progress.report(0.1 * static_cast<double>(d + 1));
   }
-  const Match found = match(surfaces, features, options, progress.stage("matching", 0.2, 0.4));
+  const Match found =
+      match<Scalar>(surfaces, features, options, progress.stage("matching", 0.2, 0.4));
 
   std::array<Deformation<Scalar>, 2> deformations;
   std::array<MatrixField, 2> predicted;
@@ -95,12 +95,11 @@ JointLossValues joint_loss(const JointNetworks<Scalar>& networks, const JointPai
     of_loss.match[d].coarse = spectral_signal_backward(*pair[d]->match.operators, pair[d]->coarse,
                                                        found[d].coarse, of_signal);
   }
-  const FeaturePair of_features = match_backward(surfaces, features, found, of_loss.match, options,
-                                                 progress.stage("derivatives", 0.5, 0.9));
+  const FeaturePair<Scalar> of_features = match_backward<Scalar>(
+      surfaces, features, found, of_loss.match, options, progress.stage("derivatives", 0.5, 0.9));
   for (size_t d = 0; d < 2; ++d) {
     diffusion_net_backward(networks.features.architecture.sizes, networks.features.parameters,
-                           pair[d]->features.diffusion, traces[d],
-                           RowMatrix<Scalar>(of_features[d].template cast<Scalar>()),
+                           pair[d]->features.diffusion, traces[d], of_features[d],
                            gradient->features);
   }
   progress.report(1.0);

@@ -98,6 +98,15 @@ double squared_length(const LayerParameters<float>& gradient) {
   return sum;
 }
 
+UnsupervisedOptions times(UnsupervisedOptions options, double share) {
+  for (double* weight :
+       {&options.orthogonality, &options.coupling, &options.bijectivity, &options.jacobians.fit,
+        &options.jacobians.smoothness, &options.jacobians.determinant}) {
+    *weight *= share;
+  }
+  return options;
+}
+
 void add(UnsupervisedLossValues& sum, const UnsupervisedLossValues& one, double share) {
   sum.orthogonality += share * one.orthogonality;
   sum.coupling += share * one.coupling;
@@ -162,11 +171,11 @@ JointTrainer::JointTrainer(std::vector<std::shared_ptr<const Surface>> surfaces,
   }
 }
 
-double JointTrainer::guide_weight(int epoch) const {
+double JointTrainer::guide_share(int epoch) const {
   if (guides_.empty() || epoch >= options_.guided_epochs) {
     return 0.0;
   }
-  return options_.guide_weight * (1.0 - static_cast<double>(epoch) / options_.guided_epochs);
+  return 1.0 - static_cast<double>(epoch) / options_.guided_epochs;
 }
 
 bool JointTrainer::finished() const {
@@ -192,7 +201,7 @@ std::vector<JointTrainer::Step> JointTrainer::steps_of(int epoch) const {
   std::mt19937_64 generator(sequence);
   const int count = static_cast<int>(surfaces_.size());
   std::vector<Step> steps;
-  if (guide_weight(epoch) > 0.0) {
+  if (guide_share(epoch) > 0.0) {
     std::vector<int> order(guides_.size());
     for (size_t i = 0; i < order.size(); ++i) {
       order[i] = static_cast<int>(i);
@@ -216,7 +225,8 @@ std::vector<JointTrainer::Step> JointTrainer::steps_of(int epoch) const {
   return steps;
 }
 
-void JointTrainer::update(const JointGradient<float>& gradient, int step) {
+void JointTrainer::update(const JointGradient<float>& gradient, const UnsupervisedOptions& loss,
+                          int step) {
   const int total = options_.epochs * pairs_per_epoch();
   const auto rate = [&](const std::array<double, 2>& ends) {
     return decayed_learning_rate(ends[0], ends[1], step, total);
@@ -228,7 +238,7 @@ void JointTrainer::update(const JointGradient<float>& gradient, int step) {
   }
   feature_adam_.step(of_features, rate(options_.feature_learning_rate),
                      networks_.features.parameters);
-  if (!jacobian_adam_.has_value() || !options_.loss.jacobians.any()) {
+  if (!jacobian_adam_.has_value() || !loss.jacobians.any()) {
     return;
   }
   LayerParameters<float> of_jacobians = gradient.jacobians;
@@ -250,7 +260,8 @@ const JointEpoch& JointTrainer::epoch(ProgressRange progress, const Watch& watch
   const Tensors before = state();
   JointEpoch result;
   result.epoch = static_cast<int>(history_.size());
-  result.guide_weight = guide_weight(result.epoch);
+  result.guide_share = guide_share(result.epoch);
+  const UnsupervisedOptions scaled = times(options_.loss, 1.0 - result.guide_share);
   const std::vector<Step> steps = steps_of(result.epoch);
   result.pairs = static_cast<int>(steps.size());
   const double share = 1.0 / static_cast<double>(steps.size());
@@ -259,14 +270,14 @@ const JointEpoch& JointTrainer::epoch(ProgressRange progress, const Watch& watch
       const Step& step = steps[s];
       Guide guide;
       if (step.guide != nullptr) {
-        guide = {result.guide_weight, step.guide->maps};
+        guide = {result.guide_share * options_.guide_weight, step.guide->maps};
       }
       JointGradient<float> gradient;
       const JointLossValues loss =
           joint_loss(networks_,
                      {surfaces_[static_cast<size_t>(step.first)].get(),
                       surfaces_[static_cast<size_t>(step.second)].get()},
-                     options_.loss, guide, &gradient,
+                     scaled, guide, &gradient,
                      progress.stage("training", share * static_cast<double>(s),
                                     share * static_cast<double>(s + 1)));
       if (!std::isfinite(loss.total())) {
@@ -275,7 +286,7 @@ const JointEpoch& JointTrainer::epoch(ProgressRange progress, const Watch& watch
                                                " and " + std::to_string(step.second) +
                                                " is not a number. Use a smaller learning rate.");
       }
-      update(gradient, result.epoch * pairs_per_epoch() + static_cast<int>(s));
+      update(gradient, scaled, result.epoch * pairs_per_epoch() + static_cast<int>(s));
       add(result.loss.terms, loss.terms, share);
       result.loss.guide += share * loss.guide;
       if (watch) {

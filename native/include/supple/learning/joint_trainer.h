@@ -25,8 +25,9 @@ struct GuidePair {
 struct JointTrainOptions {
   UnsupervisedOptions loss;  ///< the paper's weights
   int epochs = 20;           ///< >= 1
-  /// Epochs at the start that take their pairs from the guides, whose weight falls from
-  /// `guide_weight` to 0 over them by equal steps; without guides there are none.
+  /// Epochs at the start that take their pairs from the guides; without guides there are none.
+  /// Their share s of the loss falls by equal steps from 1 in the first of these epochs to 0 after
+  /// the last: s guide_weight |C' - guide|^2 + (1 - s) loss.
   int guided_epochs = 5;
   double guide_weight = 1.0;
   /// First and last of each network; between them the same factor every step.
@@ -46,7 +47,7 @@ struct JointEpoch {
   int epoch = 0;  ///< from 0
   int pairs = 0;
   JointLossValues loss;
-  double guide_weight = 0.0;
+  double guide_share = 0.0;
 };
 
 /// One pair a step, Adam for each network. An epoch takes every surface once, with another of its
@@ -90,8 +91,8 @@ class JointTrainer {
     const GuidePair* guide;
   };
   std::vector<Step> steps_of(int epoch) const;
-  double guide_weight(int epoch) const;
-  void update(const JointGradient<float>& gradient, int step);
+  double guide_share(int epoch) const;
+  void update(const JointGradient<float>& gradient, const UnsupervisedOptions& loss, int step);
 
   std::vector<std::shared_ptr<const Surface>> surfaces_;
   std::vector<std::vector<int>> partners_;  // of each surface, those of its group

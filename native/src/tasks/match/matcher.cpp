@@ -70,9 +70,9 @@ const std::vector<JointEpoch>& Matcher::history() const {
 const MatchNetworks& Matcher::networks() const { return impl_->now(); }
 
 InitialMap Matcher::features_map(ProgressRange progress) const {
-  FeaturePair features;
+  FeaturePair<float> features;
   for (size_t d = 0; d < 2; ++d) {
-    features[d] = impl_->now().features.features(impl_->surfaces[d]->features).cast<double>();
+    features[d] = impl_->now().features.features(impl_->surfaces[d]->features);
   }
   const Match found =
       match({&impl_->surfaces[0]->match, &impl_->surfaces[1]->match}, features,
