@@ -136,7 +136,7 @@ TEST(SoftMapPair, TilesJoinWithoutASeam) {
 TEST(SoftMapPair, SinglePrecisionIsThatOfTheProducts) {
   const Large large;
   const auto features = as<float>(large.features);
-  for (const double temperature : {1.0, 0.07, 0.033, 1e-3}) {
+  for (const double temperature : {0.07, 0.033, 1e-3}) {
     const double tolerance = 1e-6 + 3e-7 / temperature;
     const SoftMapPair<float> maps(features[0], features[1], temperature);
     const auto pulled = maps.apply(as<float>(large.values));
