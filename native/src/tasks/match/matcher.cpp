@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <optional>
 #include <utility>
 
 #include "supple/core/error.h"
+#include "supple/spectral/map_fit.h"
 #include "supple/tasks/match.h"
 #include "tasks/initial_map/candidates.h"
 
 namespace supple {
 namespace {
+
+constexpr Eigen::Index kFew = 20, kStep = 4;  // functions that ZoomOut starts from, and its steps
 
 const PreparedMesh& checked(const std::shared_ptr<const PreparedMesh>& mesh, const char* which) {
   if (mesh == nullptr) {
@@ -44,6 +48,11 @@ struct Matcher::Impl {
     }
   }
 
+  // C' of the features, source to target.
+  RowMatrix<double> functional_map(const ProgressRange& progress) const;
+  // From its first few functions on by ZoomOut: features that lead roughly to the right place are
+  // enough.
+  InitialMap upsampled(const RowMatrix<double>& map, const ProgressRange& progress) const;
   const MatchNetworks& now() const { return trainer.has_value() ? trainer->networks() : networks; }
 
   MatchOptions options;
@@ -69,16 +78,31 @@ const std::vector<JointEpoch>& Matcher::history() const {
 
 const MatchNetworks& Matcher::networks() const { return impl_->now(); }
 
-InitialMap Matcher::features_map(ProgressRange progress) const {
+RowMatrix<double> Matcher::Impl::functional_map(const ProgressRange& progress) const {
   FeaturePair<float> features;
   for (size_t d = 0; d < 2; ++d) {
-    features[d] = impl_->now().features.features(impl_->surfaces[d]->features);
+    features[d] = now().features.features(surfaces[d]->features);
   }
-  const Match found =
-      match({&impl_->surfaces[0]->match, &impl_->surfaces[1]->match}, features,
-            impl_->options.training.loss, progress.stage("comparing features", 0.0, 0.8));
+  return match<float>({&surfaces[0]->match, &surfaces[1]->match}, features, options.training.loss,
+                      progress)[0]
+      .soft_map;
+}
+
+InitialMap Matcher::Impl::upsampled(const RowMatrix<double>& map,
+                                    const ProgressRange& progress) const {
+  const initial_maps::MeshPair pair(*source, *target);
+  const Eigen::Index few = std::min({kFew, map.rows(), map.cols(), pair.count});
+  return pair.finished(
+      sampled_zoomout(pair.source_functions, pair.target_functions, map.topLeftCorner(few, few),
+                      pair.count, kStep, {}, progress.stage("upsampling", 0.0, 0.5)),
+      progress.stage("finding vertices", 0.5, 1.0));
+}
+
+InitialMap Matcher::features_map(ProgressRange progress) const {
+  const RowMatrix<double> map =
+      impl_->functional_map(progress.stage("comparing features", 0.0, 0.8));
   return initial_maps::MeshPair(*impl_->source, *impl_->target)
-      .finished(found[0].soft_map, progress.stage("finding vertices", 0.8, 1.0));
+      .finished(map, progress.stage("finding vertices", 0.8, 1.0));
 }
 
 MatchResult Matcher::run(ProgressRange progress, const Watch& watch) {
@@ -92,19 +116,26 @@ MatchResult Matcher::run(ProgressRange progress, const Watch& watch) {
       watch(epoch);
     }
   }
+  const RowMatrix<double> map =
+      impl_->functional_map(progress.stage("comparing features", 0.8, 0.84));
   MatchResult result;
-  result.initial = features_map(progress.stage("comparing features", 0.8, 0.85));
-  if (impl_->options.automatic) {
-    InitialMap other = automatic_map(*impl_->source, *impl_->target,
-                                     progress.stage("looking for other maps", 0.85, 0.95));
+  result.initial = initial_maps::MeshPair(*impl_->source, *impl_->target)
+                       .finished(map, progress.stage("finding vertices", 0.84, 0.86));
+  const auto consider = [&](InitialMap other, bool automatic) {
     if (other.score.value() > result.initial.score.value()) {
       result.initial = std::move(other);
-      result.automatic = true;
+      result.automatic = automatic;
     }
+  };
+  consider(impl_->upsampled(map, progress.stage("upsampling", 0.86, 0.88)), false);
+  if (impl_->options.automatic) {
+    consider(automatic_map(*impl_->source, *impl_->target,
+                           progress.stage("looking for other maps", 0.88, 0.96)),
+             true);
   }
   const Refiner refiner(impl_->source, impl_->target, refining_network(impl_->now()),
                         impl_->options.refine);
-  result.refined = refiner.refine(result.initial.point_map, progress.stage("refining", 0.95, 1.0));
+  result.refined = refiner.refine(result.initial.point_map, progress.stage("refining", 0.96, 1.0));
   return result;
 }
 
