@@ -81,17 +81,20 @@ InitialMap Matcher::features_map(ProgressRange progress) const {
       .finished(found[0].soft_map, progress.stage("finding vertices", 0.8, 1.0));
 }
 
-MatchResult Matcher::run(ProgressRange progress, const Watch& watch) {
-  const ProgressRange adapting = progress.stage("adapting to the pair", 0.0, 0.8);
+void Matcher::adapt(ProgressRange progress, const Watch& watch) {
   const double epochs = impl_->options.training.epochs;
   while (impl_->trainer.has_value() && !impl_->trainer->finished()) {
     const auto done = static_cast<double>(history().size());
     const JointEpoch& epoch = impl_->trainer->epoch(
-        adapting.stage("adapting to the pair", done / epochs, (done + 1.0) / epochs));
+        progress.stage("adapting to the pair", done / epochs, (done + 1.0) / epochs));
     if (watch) {
       watch(epoch);
     }
   }
+}
+
+MatchResult Matcher::run(ProgressRange progress, const Watch& watch) {
+  adapt(progress.stage("adapting to the pair", 0.0, 0.8), watch);
   MatchResult result;
   result.initial = features_map(progress.stage("comparing features", 0.8, 0.85));
   if (impl_->options.automatic) {
