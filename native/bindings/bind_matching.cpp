@@ -9,6 +9,11 @@ using Tensors = std::map<std::string, RowMatrix<float>>;
 using Network = LocalJacobianNetwork<float>;
 using Meshes = std::vector<std::shared_ptr<PreparedMesh>>;
 
+// The part [from, to] of a longer call that is `progress`.
+ProgressRange part_of(Progress* progress, const char* name, const std::array<double, 2>& part) {
+  return range(progress).stage(name, part[0], part[1]);
+}
+
 // A trainer and the meshes that its surfaces look into.
 struct MeshTrainer {
   MeshTrainer(Meshes meshes_in, std::vector<int> groups, std::vector<GuidePair> guides,
@@ -105,11 +110,12 @@ void bind_matching(py::module_& module) {
       .def_readonly("round_trip", &GuideMaps::round_trip);
   module.def(
       "guide_maps",
-      [](const PreparedMesh& first, const PreparedMesh& second, int functions, Progress* progress) {
-        return guide_maps(first, second, functions, range(progress));
+      [](const PreparedMesh& first, const PreparedMesh& second, int functions, Progress* progress,
+         const std::array<double, 2>& part) {
+        return guide_maps(first, second, functions, part_of(progress, "looking for guides", part));
       },
       py::arg("first"), py::arg("second"), py::arg("functions"), py::arg("progress") = nullptr,
-      NoGil());
+      py::arg("part") = std::array{0.0, 1.0}, NoGil());
 
   py::class_<JointTrainOptions>(module, "JointTrainOptions")
       .def(py::init<>())
@@ -145,8 +151,10 @@ void bind_matching(py::module_& module) {
       .def_property_readonly("history", [](const MeshTrainer& t) { return t.trainer.history(); })
       .def(
           "epoch",
-          [](MeshTrainer& t, Progress* progress) { return t.trainer.epoch(range(progress)); },
-          py::arg("progress") = nullptr, NoGil())
+          [](MeshTrainer& t, Progress* progress, const std::array<double, 2>& part) {
+            return t.trainer.epoch(part_of(progress, "training", part));
+          },
+          py::arg("progress") = nullptr, py::arg("part") = std::array{0.0, 1.0}, NoGil())
       .def("networks",
            [](const MeshTrainer& t) {
              return std::make_shared<MatchNetworks>(t.trainer.networks());
@@ -189,6 +197,12 @@ void bind_matching(py::module_& module) {
           "features_map",
           [](const Matcher& m, Progress* progress) { return m.features_map(range(progress)); },
           py::arg("progress") = nullptr, NoGil())
+      .def(
+          "adapt",
+          [](Matcher& m, const std::function<void(const JointEpoch&)>& watch, Progress* progress) {
+            m.adapt(range(progress), watch);
+          },
+          py::arg("watch") = nullptr, py::arg("progress") = nullptr, NoGil())
       .def(
           "run",
           [](Matcher& m, const std::function<void(const JointEpoch&)>& watch, Progress* progress) {

@@ -64,6 +64,7 @@ from .transfer import (
     transfer_uvs,
     within_islands,
 )
+from .unsupervised import UnsupervisedResult, train_unsupervised
 
 __all__ = [
     "Cancelled",
@@ -94,6 +95,7 @@ __all__ = [
     "SuppleError",
     "SurfaceMap",
     "TrainResult",
+    "UnsupervisedResult",
     "__version__",
     "automatic_map",
     "blas_name",
@@ -134,6 +136,7 @@ __all__ = [
     "symmetric_dirichlet",
     "thread_count",
     "train",
+    "train_unsupervised",
     "transfer_corners",
     "transfer_field",
     "transfer_groups",

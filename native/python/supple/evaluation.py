@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Refinement of maps, measured on a set with known correspondences."""
+"""Ways to refine maps and to find them, measured on a set with known correspondences."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from . import map_metrics
-from .initial_maps import zoomout_map
+from . import _native, map_metrics
+from .initial_maps import automatic_map, zoomout_map
+from .match_model import MatchModel
 from .match_sets import MatchSet, MatchShape
+from .matching import EPOCHS, Epoch, Matcher, configure
 from .mesh import PreparedMesh
 from .model import Model
 from .refining import Refiner
@@ -20,21 +22,26 @@ INITIAL = "initial"
 # The columns of a report, and whether more is better.
 COLUMNS = {"geodesic": False, "inversion": False, "dirichlet": False, "coverage": True}
 SECONDS = "seconds_per_pair"
+FLIPPED = "flipped"
+_FLIP_POINTS = 100  # the first of a set are the farthest from each other
 
 ZOOMOUT_FROM, ZOOMOUT_TO, ZOOMOUT_STEP = 20, 120, 5  # the paper's
 
 
 @dataclass(frozen=True)
 class Method:
-    """One way to refine.
+    """One way to refine a map or to find one.
 
     Attributes:
-        bind: from both prepared meshes to what refines maps between them. Only the latter's time is
-            "seconds_per_pair": bases and factors are ready.
+        bind: from both prepared meshes to what refines maps between them, or finds one and is given
+            none. Only the latter's time is "seconds_per_pair": meshes are prepared, and what bind
+            does is done.
+        refines: whether it needs a map to start from.
     """
 
     name: str
-    bind: Callable[[PreparedMesh, PreparedMesh], Callable[[Map], Map]]
+    bind: Callable[[PreparedMesh, PreparedMesh], Callable[[Map | None], Map]]
+    refines: bool = True
 
 
 def _refiner(**options: object) -> Callable[[PreparedMesh, PreparedMesh], Callable[[Map], Map]]:
@@ -66,12 +73,75 @@ def methods(model: str | Model = "spectral", **options: object) -> list[Method]:
     ]
 
 
+def match_methods(
+    model: MatchModel, configs: Sequence[str], *, epochs: int = EPOCHS
+) -> list[Method]:
+    """Ways to match without a map: "automatic" (no features), "features" (as they are), and one a
+    configuration of Matcher, adaptation included.
+
+    "ljn" is all that Matcher.run does. The others end with the functional map of the adapted
+    features; "without_ljn" is the paper's "W/o LJN".
+
+    Raises:
+        SuppleError: bad_option.
+    """
+    for config in configs:
+        configure(_native.JointTrainOptions(), config)
+    return [
+        Method("automatic", _automatic, refines=False),
+        Method("features", _features(model, "ljn", 0), refines=False),
+        *(
+            Method(
+                config,
+                _matcher(model, epochs) if config == "ljn" else _features(model, config, epochs),
+                refines=False,
+            )
+            for config in configs
+        ),
+    ]
+
+
+def _automatic(source: PreparedMesh, target: PreparedMesh) -> Callable[[None], Map]:
+    return lambda _: automatic_map(source, target).point_map
+
+
+def _features(
+    model: MatchModel, config: str, epochs: int
+) -> Callable[[PreparedMesh, PreparedMesh], Callable[[None], Map]]:
+    def bind(source: PreparedMesh, target: PreparedMesh) -> Callable[[None], Map]:
+        def find(_: None) -> Map:
+            matcher = Matcher(source, target, model=model, config=config, epochs=epochs)
+            matcher.adapt(callback=_interruptible)
+            return matcher.features_map().point_map
+
+        return find
+
+    return bind
+
+
+def _matcher(
+    model: MatchModel, epochs: int
+) -> Callable[[PreparedMesh, PreparedMesh], Callable[[None], Map]]:
+    def bind(source: PreparedMesh, target: PreparedMesh) -> Callable[[None], Map]:
+        def find(_: None) -> Map:
+            matcher = Matcher(source, target, model=model, epochs=epochs)
+            return matcher.run(callback=_interruptible).point_map
+
+        return find
+
+    return bind
+
+
+def _interruptible(epoch: Epoch) -> None:
+    """Back in Python after each epoch, where Ctrl+C takes effect."""
+
+
 class Evaluation:
     """Measures pair after pair; meshes are prepared once each.
 
     Args:
-        chosen: the methods.
-        runs: times each refinement is measured; the least counts.
+        chosen: the methods. Where one refines, the set must have maps to refine; they are a row.
+        runs: times each method is measured; the least counts.
         cache: as of PreparedMesh.
         note: called with what is being done, and the part of it all that is done.
     """
@@ -90,12 +160,13 @@ class Evaluation:
         self._runs = runs
         self._cache = cache
         self._note = note
+        self._refines = any(method.refines for method in self._chosen)
         self._prepared: dict[str, PreparedMesh] = {}
         self._steps = len(match_set.pairs) * (len(self._chosen) + 2)
         self._done = 0
 
     def run(self) -> dict:
-        """{"rows": {NAME: means and "change_percent" from initial}, "pairs": count, ...}."""
+        """{"rows": {NAME: means, and "change_percent" from initial}, "pairs": count, ...}."""
         measured = {f"{a} {b}": self._pair(a, b) for a, b in self._set.pairs}
         return {**summary(list(measured.values())), "set": self._set.name, "measured": measured}
 
@@ -106,14 +177,17 @@ class Evaluation:
     def _pair(self, a: str, b: str) -> dict[str, dict[str, float]]:
         self._step(f"{a} {b}: preparing")
         source, target = (self._prepare(self._set.shapes[name]) for name in (a, b))
-        start = self._set.initial[a, b]
-        maps, rows = {INITIAL: start}, {INITIAL: {SECONDS: 0.0, "bind_seconds": 0.0}}
+        maps: dict[str, Map] = {}
+        rows: dict[str, dict[str, float]] = {}
+        start = self._set.initial[a, b] if self._refines else None
+        if start is not None:
+            maps[INITIAL], rows[INITIAL] = start, {SECONDS: 0.0, "bind_seconds": 0.0}
         for method in self._chosen:
             self._step(f"{a} {b}: {method.name}")
             began = time.perf_counter()
             refine = method.bind(source, target)
             bound = time.perf_counter() - began
-            if self._done <= len(self._chosen) + 2:
+            if method.refines and self._done <= len(self._chosen) + 2:
                 refine(start)  # the first call of all warms up
             seconds = []
             for _ in range(self._runs):
@@ -127,12 +201,18 @@ class Evaluation:
 
     def _measure(self, a: str, b: str, maps: dict[str, Map], rows: dict[str, dict]) -> None:
         source, target = (self._prepared[name] for name in (a, b))
-        template = self._set.shapes[a].template
-        errors = map_metrics.geodesic_errors(
-            target,
-            self._set.shapes[b].template,
-            np.stack([point_map[template] for point_map in maps.values()], axis=1),
-        )
+        template, truth = (self._set.shapes[name].template for name in (a, b))
+        mirror = self._set.shapes[b].mirror
+        images = np.stack([point_map[template] for point_map in maps.values()], axis=1)
+        geodesics = map_metrics.Geodesics(target.vertices, target.faces)
+        errors = map_metrics.geodesic_errors(target, truth, images, geodesics=geodesics)
+        if mirror is not None:
+            few = slice(_FLIP_POINTS)
+            wrong = map_metrics.flipped(
+                target, truth[few], mirror[few], images[few], geodesics=geodesics
+            )
+            for name, flip in zip(maps, wrong, strict=True):
+                rows[name][FLIPPED] = float(flip)
         for (name, point_map), error in zip(maps.items(), errors, strict=True):
             rows[name] |= {
                 "geodesic": error.mean,
@@ -152,16 +232,18 @@ class Evaluation:
 
 
 def summary(measured: list[dict[str, dict[str, float]]]) -> dict:
-    """Plain means over pairs, and for each row the change from the initial map in percent (None
-    where that is 0)."""
+    """Plain means over pairs ("flipped": over those with mirrored truth), and where there are
+    initial maps, for each row the change from them in percent (None where that is 0)."""
     rows: dict[str, dict] = {}
     for name in measured[0]:
         rows[name] = {
-            column: float(np.mean([pair[name][column] for pair in measured]))
-            for column in measured[0][name]
+            column: float(
+                np.mean([pair[name][column] for pair in measured if column in pair[name]])
+            )
+            for column in dict.fromkeys(column for pair in measured for column in pair[name])
         }
-    first = rows[INITIAL]
-    for row in rows.values():
+    first = rows.get(INITIAL)
+    for row in rows.values() if first else ():
         row["change_percent"] = {
             column: 100.0 * (row[column] / first[column] - 1.0) if first[column] > 0 else None
             for column in COLUMNS
@@ -170,28 +252,37 @@ def summary(measured: list[dict[str, dict[str, float]]]) -> dict:
 
 
 def cells(row: dict) -> list[str]:
-    """The columns of a row as text: each figure with its change from the initial map."""
+    """The columns of a row as text: each figure with its change from the initial map, if any."""
     texts = []
     for column in COLUMNS:
-        change = row["change_percent"][column]
+        change = row.get("change_percent", {}).get(column)
         beside = "" if not change else f" ({change:+.1f}%)"
         texts.append(f"{row[column]:.3f}{beside}")
+    if FLIPPED in row:
+        texts.append(f"{100.0 * row[FLIPPED]:.0f}%")
     seconds = row[SECONDS]
     return [*texts, f"{1e3 * seconds:.0f} ms" if seconds else "-"]
 
 
+def head(report: dict) -> list[str]:
+    """Names of the columns of `cells`, the row's first."""
+    flips = any(FLIPPED in row for row in report["rows"].values())
+    return ["map", *COLUMNS, *([FLIPPED] if flips else []), "per pair"]
+
+
 def markdown(report: dict) -> str:
     """The rows as a table."""
-    head = ["map", *COLUMNS, "per pair"]
+    columns = head(report)
+    changes = INITIAL in report["rows"]
     lines = [
         f"# {report['set']}: {report['pairs']} pairs",
         "",
         "Geodesic error x100 of the root of the target's area, exact paths; inverted faces and "
         "covered area in percent; Dirichlet energy at area 1 (2 for the identity). Means over "
-        "pairs, in brackets the change from the initial map.",
+        f"pairs{', in brackets the change from the initial map' if changes else ''}.",
         "",
-        "| " + " | ".join(head) + " |",
-        "|---|" + "---:|" * (len(head) - 1),
+        "| " + " | ".join(columns) + " |",
+        "|---|" + "---:|" * (len(columns) - 1),
     ]
     lines += [f"| {name} | {' | '.join(cells(row))} |" for name, row in report["rows"].items()]
     lost = sum(row["unreachable"] for row in report["rows"].values())

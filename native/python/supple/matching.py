@@ -29,6 +29,9 @@ TERMS = (
 
 CONFIGURATIONS = ("ljn", "without_ljn", "ulrssm", "cdfm")
 
+EPOCHS: int = _native.MatchOptions().training.epochs
+"""Of adaptation to a pair, by default."""
+
 
 @dataclass(frozen=True)
 class Epoch:
@@ -93,8 +96,7 @@ class Matcher:
         config: what the networks are adapted by: "ljn", the paper's loss; "without_ljn", the same
             without the deformation's part; "ulrssm" (Cao et al. 2023) or "cdfm" (Sun et al. 2023).
             All but "ljn" also refine without the network.
-        epochs: of adaptation to the pair, two steps each; 0 for the features as they are, None for
-            the default.
+        epochs: of adaptation to the pair, two steps each; 0 for the features as they are.
         automatic: also look for a map without features, and take the more plausible one.
         seed: of the order of steps.
         progress: a Progress to watch and cancel.
@@ -111,7 +113,7 @@ class Matcher:
         *,
         model: str | os.PathLike | MatchModel = "features",
         config: str = "ljn",
-        epochs: int | None = None,
+        epochs: int = EPOCHS,
         automatic: bool = True,
         seed: int = 0,
         progress: _native.Progress | None = None,
@@ -122,15 +124,14 @@ class Matcher:
         self.target = _prepared(target, "target", progress)
         options = _native.MatchOptions()
         configure(options.training, config)
-        if epochs is not None:
-            options.training.epochs = epochs
+        options.training.epochs = epochs
         options.training.seed = seed
         options.automatic = automatic
         self._metadata = model.metadata
         self._native = _native.Matcher(
             self.source.native, self.target.native, model.native, options, progress
         )
-        self.epochs: int = options.training.epochs
+        self.epochs = epochs
         self.notes = [Note(note.code, note.count, note.message) for note in self._native.notes]
 
     @property
@@ -151,6 +152,15 @@ class Matcher:
         """
         return _initial_map(self._native.features_map(progress))
 
+    def adapt(
+        self,
+        *,
+        callback: Callable[[Epoch], None] | None = None,
+        progress: _native.Progress | None = None,
+    ) -> None:
+        """Adapt to the pair, if that is not done yet; arguments and errors are those of run."""
+        self._native.adapt(_watch(callback), progress)
+
     def run(
         self,
         *,
@@ -170,12 +180,17 @@ class Matcher:
             SuppleError: not_finite.
             Cancelled: if progress was cancelled.
         """
-        watch = None if callback is None else lambda native: callback(epoch_of(native))
-        native = self._native.run(watch, progress)
+        native = self._native.run(_watch(callback), progress)
         refined = refine_result(native.refined, backward=False, notes=self.notes)
         return MatchResult(
             refined, _initial_map(native.initial), native.automatic, self.history, list(self.notes)
         )
+
+
+def _watch(
+    callback: Callable[[Epoch], None] | None,
+) -> Callable[[_native.JointEpoch], None] | None:
+    return None if callback is None else lambda native: callback(epoch_of(native))
 
 
 def match(

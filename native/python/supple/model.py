@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Networks and their files: safetensors, with the architecture in the metadata."""
 
+import json
 import os
 from pathlib import Path
 
@@ -96,11 +97,25 @@ def load_model(name_or_path: str | os.PathLike) -> Model:
 def write_tensors(
     path: str | os.PathLike, tensors: dict[str, NDArray], metadata: dict[str, str]
 ) -> None:
-    """Write a safetensors file; an existing one is replaced whole or not at all."""
+    """Write a safetensors file; an existing one is replaced whole or not at all, even where the
+    power fails. The same contents are the same bytes."""
     path = Path(path)
     partial = path.with_name(path.name + ".partial")
-    safetensors.numpy.save_file(tensors, partial, metadata=metadata)
+    with open(partial, "wb") as file:
+        file.write(_ordered(safetensors.numpy.save(tensors, metadata=metadata)))
+        file.flush()
+        os.fsync(file.fileno())
     os.replace(partial, path)
+
+
+def _ordered(content: bytes) -> bytes:
+    """A safetensors file with its metadata by name; the library's order is another each time."""
+    size = int.from_bytes(content[:8], "little")
+    header = json.loads(content[8 : 8 + size])
+    header["__metadata__"] = dict(sorted(header["__metadata__"].items()))
+    text = json.dumps(header, separators=(",", ":"), ensure_ascii=False).encode()
+    text += b" " * (-len(text) % 8)
+    return len(text).to_bytes(8, "little") + text + content[8 + size :]
 
 
 def read_tensors(

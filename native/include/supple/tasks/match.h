@@ -71,9 +71,11 @@ class Matcher {
   /// Called after each epoch of adaptation; may ask for `features_map`. What it throws ends the
   /// work.
   using Watch = std::function<void(const JointEpoch&)>;
-  /// Adapts the networks to the pair, then refines the map of the features, or a more plausible
-  /// one, with the second network (or none). Goes on where a cancelled run left off.
+  /// Adapts the networks to the pair, if they are not yet. Goes on where a cancelled call left off.
   /// Errors: those of `JointTrainer::epoch`.
+  void adapt(ProgressRange progress = {}, const Watch& watch = {});
+  /// Adapts, then refines the map of the features, or a more plausible one, with the second network
+  /// (or none). Errors: those of `adapt`.
   MatchResult run(ProgressRange progress = {}, const Watch& watch = {});
   const std::vector<JointEpoch>& history() const;  ///< of adaptation so far
   const MatchNetworks& networks() const;           ///< as adapted so far

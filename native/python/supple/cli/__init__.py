@@ -10,8 +10,10 @@ import supple
 from .caching import show_cache
 from .editing import edit
 from .estimating import estimate
-from .evaluating import evaluate_refine
+from .evaluating import evaluate_match, evaluate_refine
+from .matching import match
 from .refining import refine
+from .training import train_unsupervised
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -20,12 +22,17 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 evaluate = typer.Typer(no_args_is_help=True, help="Measure on data with known answers.")
+train = typer.Typer(no_args_is_help=True, help="Train networks on your own shapes.")
 app.add_typer(evaluate, name="evaluate")
+app.add_typer(train, name="train")
 app.command()(edit)
 app.command()(estimate)
+app.command()(match)
 app.command()(refine)
 app.command("cache")(show_cache)
+evaluate.command("match")(evaluate_match)
 evaluate.command("refine")(evaluate_refine)
+train.command("unsupervised")(train_unsupervised)
 
 
 @app.callback(invoke_without_command=True)
@@ -36,6 +43,11 @@ def main(
     if version:
         print(f"supple {supple.__version__}")
         raise typer.Exit()
+
+
+@train.callback()
+def _train() -> None:
+    """Train networks on your own shapes."""
 
 
 @evaluate.callback()

@@ -2,6 +2,7 @@
 """What the commands share: the terminal, progress, and writing files."""
 
 import os
+import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -11,6 +12,8 @@ import rich.console
 import rich.progress
 
 import supple
+
+from ..matching import Epoch
 
 console = rich.console.Console(stderr=True)
 _Result = TypeVar("_Result")
@@ -27,8 +30,24 @@ def progress_bar() -> rich.progress.Progress:
     return rich.progress.Progress(*_COLUMNS, console=console, transient=True)
 
 
-def watched(label: str, work: Callable[[supple.Progress], _Result]) -> _Result:
-    """Runs native work in a thread beside a progress bar; Ctrl+C cancels it."""
+class LatestLoss:
+    """A callback for training; as text, how it stands."""
+
+    def __init__(self) -> None:
+        self._text = ""
+
+    def __call__(self, epoch: Epoch) -> None:
+        self._text = f"epoch {epoch.epoch + 1}, loss {epoch.loss['total']:.4g}"
+
+    def __str__(self) -> str:
+        return self._text
+
+
+def watched(label: str, work: Callable[[supple.Progress], _Result], note: object = "") -> _Result:
+    """Runs native work in a thread beside a progress bar; Ctrl+C cancels it.
+
+    note: what is said beside the label, as str(note) has it at the time.
+    """
     progress = supple.Progress()
     outcome: dict[str, object] = {}
 
@@ -45,7 +64,8 @@ def watched(label: str, work: Callable[[supple.Progress], _Result]) -> _Result:
         try:
             while thread.is_alive():
                 thread.join(0.05)
-                bar.update(task, completed=progress.fraction)
+                text = f"{label} {note}".rstrip()
+                bar.update(task, description=text, completed=progress.fraction)
         except KeyboardInterrupt:
             progress.cancel()
             thread.join()
@@ -61,3 +81,13 @@ def write_whole(path: Path, text: str) -> None:
     partial = path.with_name(path.name + ".partial")
     partial.write_text(text, encoding="utf-8")
     os.replace(partial, path)
+
+
+def peak_mebibytes() -> float | None:
+    """The most memory that this process has taken, or None where the system won't say."""
+    try:
+        import resource
+    except ImportError:
+        return None
+    unit = 1024**2 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit

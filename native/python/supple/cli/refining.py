@@ -13,7 +13,8 @@ import supple
 
 from ..cases import read_mesh
 from ..match_sets import read_indices
-from .console import console, watched, write_whole
+from .console import console, watched
+from .maps import prepared, print_notes, write_map, written
 
 
 class Start(StrEnum):
@@ -48,36 +49,21 @@ def refine(
     try:
         if first_map is not None and landmarks is not None:
             raise supple.SuppleError("bad_option", "Give --map or --landmarks, not both.")
-        prepared = []
-        for path in (source, target):
-            vertices, faces = read_mesh(path)
-            prepared.append(
-                watched(
-                    f"{path.name}: preparing",
-                    lambda p, v=vertices, f=faces: supple.PreparedMesh(
-                        v, f, progress=p, cache=cache
-                    ),
-                )
-            )
-        initial = _initial(prepared, (source, target), first_map, landmarks, start)
-        refiner = supple.Refiner(*prepared, model=model if network else None)
+        meshes = prepared((source, target), cache=cache)
+        initial = _initial(meshes, (source, target), first_map, landmarks, start)
+        refiner = supple.Refiner(*meshes, model=model if network else None)
         result = watched("refining", lambda p: refiner.refine(initial, progress=p))
-        for note in refiner.notes:
-            console.print(f"note: {note.message}", highlight=False)
-        score = supple.map_score(*prepared, result.point_map)
-        write_whole(out, "".join(f"{vertex + 1}\n" for vertex in result.point_map))
+        print_notes(refiner.notes)
+        score = supple.map_score(*meshes, result.point_map)
+        write_map(out, result.point_map)
     except (supple.SuppleError, OSError) as error:
         console.print(f"[red]error[/red] {error}", highlight=False)
         raise typer.Exit(1) from error
-    typer.echo(
-        f"wrote {out}: {len(result.point_map)} lines, from 1; plausibility {score.value:.2f} "
-        f"(orientation {score.orientation:.2f}, smoothness {score.smoothness:.2f}, area "
-        f"{score.area:.2f})"
-    )
+    typer.echo(written(out, result.point_map, score))
 
 
 def _initial(
-    prepared: list[supple.PreparedMesh],
+    meshes: list[supple.PreparedMesh],
     paths: tuple[Path, Path],
     first_map: Path | None,
     landmarks: Path | None,
@@ -85,10 +71,8 @@ def _initial(
 ) -> np.ndarray:
     """The map to refine; what is to be said of it is printed."""
     if first_map is not None:
-        point_map = read_indices(
-            first_map, prepared[1].vertex_count, f"vertices of {paths[1].name}"
-        )
-        if supple.map_score(*prepared, point_map).orientation < 0.3:
+        point_map = read_indices(first_map, meshes[1].vertex_count, f"vertices of {paths[1].name}")
+        if supple.map_score(*meshes, point_map).orientation < 0.3:
             console.print(
                 "note: the map turns the surface inside out in most places; left and right are "
                 "probably exchanged"
@@ -96,15 +80,14 @@ def _initial(
         return point_map
     if landmarks is not None:
         pairs = _read_landmarks(landmarks)
-        found = watched("landmarks", lambda p: supple.landmark_map(*prepared, pairs, progress=p))
+        found = watched("landmarks", lambda p: supple.landmark_map(*meshes, pairs, progress=p))
     elif start is Start.automatic:
-        found = watched("first map", lambda p: supple.automatic_map(*prepared, progress=p))
+        found = watched("first map", lambda p: supple.automatic_map(*meshes, progress=p))
     elif start is Start.uv:
-        found = supple.uv_map(*prepared, *(_read_uvs(path) for path in paths))
+        found = supple.uv_map(*meshes, *(_read_uvs(path) for path in paths))
     else:
-        found = supple.nearest_map(*prepared, aligned=start is Start.aligned)
-    for note in found.notes:
-        console.print(f"note: {note.message}", highlight=False)
+        found = supple.nearest_map(*meshes, aligned=start is Start.aligned)
+    print_notes(found.notes)
     return found.point_map
 
 

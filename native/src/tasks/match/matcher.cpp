@@ -105,17 +105,20 @@ InitialMap Matcher::features_map(ProgressRange progress) const {
       .finished(map, progress.stage("finding vertices", 0.8, 1.0));
 }
 
-MatchResult Matcher::run(ProgressRange progress, const Watch& watch) {
-  const ProgressRange adapting = progress.stage("adapting to the pair", 0.0, 0.8);
+void Matcher::adapt(ProgressRange progress, const Watch& watch) {
   const double epochs = impl_->options.training.epochs;
   while (impl_->trainer.has_value() && !impl_->trainer->finished()) {
     const auto done = static_cast<double>(history().size());
     const JointEpoch& epoch = impl_->trainer->epoch(
-        adapting.stage("adapting to the pair", done / epochs, (done + 1.0) / epochs));
+        progress.stage("adapting to the pair", done / epochs, (done + 1.0) / epochs));
     if (watch) {
       watch(epoch);
     }
   }
+}
+
+MatchResult Matcher::run(ProgressRange progress, const Watch& watch) {
+  adapt(progress.stage("adapting to the pair", 0.0, 0.8), watch);
   const RowMatrix<double> map =
       impl_->functional_map(progress.stage("comparing features", 0.8, 0.84));
   MatchResult result;
