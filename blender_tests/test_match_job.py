@@ -100,6 +100,13 @@ def test_landmarks_and_all_options(addon, folder):
         ('"nearest"', '"landmarks"\nlandmarks = [[1, 2]]', "match.landmarks: fits one target, no"),
         ('"nearest"', '"nearest"\nlandmarks = [[1, 2]]', "match.landmarks: must be given with"),
         ('"nearest"', '"landmarks"\nlandmarks = [[1]]', "match.landmarks: must be pairs"),
+        (
+            '"nearest"',
+            '"nearest"\nepochs = 3',
+            'match.epochs: may be given with start = "features"',
+        ),
+        ('"nearest"', '"features"\nepochs = -1', "match.epochs: must be 0 or more, not -1"),
+        ('"nearest"', '"features"\nmodel = "no"', "Scan: There is no network 'no'.*; Other: There"),
         ('"uvs"', '"hair"', "match.transfer: must be some of uvs, weights, colours, keys, fit"),
         ("refine", "refined", "match.refined: unknown; the keys here are targets, source"),
         ("scene.blend", "none.blend", "input.blend: there is no file"),

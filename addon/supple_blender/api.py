@@ -26,6 +26,7 @@ from . import (
     handles,
     inbetween_bake,
     match_collect,
+    match_features,
     match_solving,
     mesh_data,
     motions,
@@ -49,6 +50,7 @@ __all__ = [
     "bake_sequence",
     "check_mesh",
     "collect_pose",
+    "find_correspondence",
     "follow_animation",
     "handles_from_groups",
     "inbetween",
@@ -147,9 +149,31 @@ def match(source, target, start="AUTOMATIC", refine=True, landmarks=(), file="",
     """Find where target's vertices belong on source, and keep that on target; return the Match.
 
     start: "AUTOMATIC", "LANDMARKS" (with `landmarks`: pairs of a source and a target vertex),
-    "NEAREST", "ALIGNED", "UVS", "FILE" (with `file`), or "CURRENT" to refine what target keeps.
+    "NEAREST", "ALIGNED", "UVS", "FILE" (with `file`), "FEATURES" (as `find_correspondence`), or
+    "CURRENT" to refine what target keeps.
     """
     options = match_collect.Options(start, refine, tuple(landmarks), str(file))
+    return _match(source, target, options, stages)
+
+
+def find_correspondence(
+    source,
+    target,
+    epochs=match_features.EPOCHS,
+    refine=True,
+    model=match_features.MODEL,
+    stages=None,
+):
+    """As `match`, by learned features that adapt to the two shapes; return the Match.
+
+    epochs: how long they adapt; 0 takes them as they are. model: the name of shipped ones, or a
+    file. `stages.learning.losses` has the loss of each epoch so far.
+    """
+    options = match_collect.Options("FEATURES", refine, epochs=epochs, model=str(model))
+    return _match(source, target, options, stages)
+
+
+def _match(source, target, options, stages):
     inputs = match_collect.collect(bpy.context, source, target, options)
     found = matching.solve(inputs, stages or Stages())
     match_solving.keep(bpy.context, source, target, inputs, found)

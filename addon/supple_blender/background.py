@@ -102,7 +102,8 @@ class LongOperator(ModalWork):
     """Mixin for operators. Subclasses define `collect`, `compute` and `write`.
 
     collect(context) -> inputs; compute(inputs, stages) -> result; write(context, inputs, result) ->
-    message. Inputs have `.name`, the object's. All three may raise UserError.
+    message. Inputs have `.name`, the object's. All three may raise UserError. watch(context) is
+    called while a window waits; what it shows must be gone after `_leave`.
     """
 
     _worker = None
@@ -128,6 +129,9 @@ class LongOperator(ModalWork):
         self._worker = Worker(lambda stages: self.compute(inputs, stages), self._stages)
         return self._begin(context, self._stages, TICK_SECONDS)
 
+    def watch(self, context):
+        pass
+
     def modal(self, context, event):
         if event.type == "ESC" and event.value == "PRESS":
             self._stages.cancel()
@@ -136,6 +140,7 @@ class LongOperator(ModalWork):
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
         if self._worker.is_alive():
+            self.watch(context)
             self._show(context, self._stages, self._inputs.name, "Esc cancels")
             return {"RUNNING_MODAL"}
         self._leave(context)

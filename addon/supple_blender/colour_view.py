@@ -42,7 +42,7 @@ def remove(obj, name):
     if shown.startswith(PREFIX) and shown in attributes:
         return  # another of ours is shown, which still needs the viewport
     if body.shading_before:
-        for space_data in _views():
+        for space_data in views():
             if space_data.shading.color_type == "VERTEX":
                 space_data.shading.color_type = body.shading_before
     body.shading_before = body.colour_before = ""
@@ -69,8 +69,7 @@ def is_viewed(obj, name, space_data):
     return shows and active is not None and active.name == name
 
 
-def _views():
-    for screen in bpy.data.screens:
-        for area in screen.areas:
-            if area.type == "VIEW_3D":
-                yield area.spaces.active
+def views():
+    """Return every 3D View there is."""
+    areas = (area for screen in bpy.data.screens for area in screen.areas)
+    return [area.spaces.active for area in areas if area.type == "VIEW_3D"]

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from . import native, prepared, space
+from . import match_features, native, prepared, space
 from .errors import UserError
 from .mesh_data import RestMesh
 from .pose import guarded
@@ -20,9 +20,10 @@ from .pose import guarded
 class MatchInput:
     """Everything a match needs.
 
-    start: a key of STARTS. worlds: matrices (4, 4) of source and target. landmarks: (p, 2), a
+    start: one of STARTS. worlds: matrices (4, 4) of source and target. landmarks: (p, 2), a
     source and a target vertex each. uvs: (m, 3, 2) of source and target. file: a map's. current: a
-    `supple.SurfaceMap`. What the start does not need may be None.
+    `supple.SurfaceMap`. epochs, model: how long which features adapt. What the start does not need
+    may be None.
     """
 
     source: RestMesh
@@ -34,6 +35,8 @@ class MatchInput:
     uvs: tuple = ()
     file: str = ""
     current: object = None
+    epochs: int = match_features.EPOCHS
+    model: str = match_features.MODEL
 
     @property
     def name(self):
@@ -104,7 +107,7 @@ def _current(inputs, source, target, progress):
     return inputs.current
 
 
-STARTS = {
+FIRST_MAPS = {
     "AUTOMATIC": _automatic,
     "LANDMARKS": _landmarks,
     "NEAREST": _nearest,
@@ -113,42 +116,75 @@ STARTS = {
     "FILE": _file,
     "CURRENT": _current,
 }
+FEATURES = "FEATURES"
+STARTS = (*FIRST_MAPS, FEATURES)
+
+WITHOUT_FEATURES = "A map found without the features was more plausible, and was taken."
 
 
-def _start(inputs, source, target, progress):
-    """Return the first map, how plausible it is (n,), and its notes."""
+def _texts(result):
+    return [in_panel_words(note.message) for note in result.notes]
+
+
+def _as_map(initial, source):
+    """Return a `supple.InitialMap` as a map, how plausible it is (n,), and notes as text."""
+    found = native.supple().SurfaceMap.from_point_map(initial.point_map, source)
+    return found, np.where(found.face < 0, 0.0, initial.score.value), _texts(initial)
+
+
+def _first(inputs, source, target, progress):
+    """As _as_map, of the start."""
     supple = native.supple()
-    found = STARTS[inputs.start](inputs, source, target, progress)
-    notes = []
-    if isinstance(found, supple.SurfaceMap):
-        corners = np.maximum(found.nearest_corners(source), 0)
-        score = supple.map_score(target, source, corners)
-    else:
-        score, notes = found.score, found.notes
-        found = supple.SurfaceMap.from_point_map(found.point_map, source)
-    return found, np.where(found.face < 0, 0.0, score.value), notes
+    found = FIRST_MAPS[inputs.start](inputs, source, target, progress)
+    if not isinstance(found, supple.SurfaceMap):
+        return _as_map(found, source)
+    corners = np.maximum(found.nearest_corners(source), 0)
+    score = supple.map_score(target, source, corners)
+    return found, np.where(found.face < 0, 0.0, score.value), []
+
+
+def _from_start(inputs, source, target, stages):
+    """As _as_map, refined if the MatchInput says so."""
+    found, confidence, notes = _first(inputs, source, target, stages.begin("Matching", 0.25))
+    if not inputs.refine:
+        return found, confidence, notes
+    progress = stages.begin("Refining", 0.15)
+    refiner = native.supple().Refiner(target, source, progress=progress)
+    refined = refiner.refine(found, progress=progress)
+    return refined.surface_map, refined.confidence, [*notes, *_texts(refined)]
+
+
+def _from_features(inputs, model, source, target, stages):
+    """As _from_start; what adapted also refines."""
+    result = match_features.match(model, inputs.epochs, source, target, stages)
+    found, confidence, notes = _as_map(result.initial, source)
+    if result.automatic:
+        notes = [WITHOUT_FEATURES, *notes]
+    if not inputs.refine:
+        return found, confidence, notes
+    refined = result.refined
+    return refined.surface_map, refined.confidence, [*notes, *_texts(refined)]
 
 
 def _solve(inputs, stages):
     supple = native.supple()
-    meshes = [
-        guarded(rest.name, lambda rest=rest: prepared.mesh(rest, stages, share=0.3))
+    is_learned = inputs.start == FEATURES
+    model = match_features.load(inputs.model) if is_learned else None
+    share = 0.05 if is_learned else 0.3  # features take long to adapt
+    source, target = (
+        guarded(rest.name, lambda rest=rest: prepared.mesh(rest, stages, share))
         for rest in (inputs.source, inputs.target)
-    ]
-    source, target = meshes
+    )
     try:
-        first, confidence, notes = _start(inputs, source, target, stages.begin("Matching", 0.25))
-        if inputs.refine:
-            progress = stages.begin("Refining", 0.15)
-            refiner = supple.Refiner(target, source, progress=progress)
-            refined = refiner.refine(first, progress=progress)
-            first, confidence = refined.surface_map, refined.confidence
-            notes = [*notes, *refined.notes]
+        if is_learned:
+            found, confidence, notes = _from_features(inputs, model, source, target, stages)
+        else:
+            found, confidence, notes = _from_start(inputs, source, target, stages)
     except supple.Cancelled:
         raise
     except supple.SuppleError as error:
         raise UserError(f"{inputs.name}: {in_panel_words(str(error), inputs.file)}") from error
-    return Match(first, confidence, [in_panel_words(note.message) for note in notes])
+    return Match(found, confidence, notes)
 
 
 def solve(inputs, stages):

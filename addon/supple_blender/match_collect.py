@@ -7,19 +7,23 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from . import compat, handles, match_map, mesh_data
+from . import compat, handles, match_features, match_map, mesh_data
 from .errors import UserError
-from .match import STARTS, MatchInput
+from .match import FEATURES, STARTS, MatchInput
 
 
 @dataclass(frozen=True)
 class Options:
-    """How to match. start: as `match.STARTS`. pairs: (source vertex, target vertex) each."""
+    """How to match. start: as `match.STARTS`. pairs: (source vertex, target vertex) each. epochs:
+    that features adapt for, 0 or more. model: their name, or a file of them.
+    """
 
     start: str = "AUTOMATIC"
     refine: bool = True
     pairs: tuple = ()
     file: str = ""
+    epochs: int = match_features.EPOCHS
+    model: str = match_features.MODEL
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,8 @@ def options_of(scene):
     settings = scene.supple_match
     pairs = tuple((pair.source_vertex, pair.target_vertex) for pair in settings.pairs)
     file = bpy.path.abspath(settings.file) if settings.file else ""
-    return Options(settings.start, settings.refine, pairs, file)
+    model = bpy.path.abspath(settings.model)
+    return Options(settings.start, settings.refine, pairs, file, settings.epochs, model)
 
 
 def source_chosen(context):
@@ -144,6 +149,8 @@ def collect(context, source, target, options):
         given["uvs"] = tuple(_active_uvs(obj) for obj in (source, target))
     elif options.start == "FILE":
         given["file"] = _file(options, target)
+    elif options.start == FEATURES:
+        given["epochs"], given["model"] = options.epochs, options.model
     elif options.start == "CURRENT":
         match_map.require(target, source, *rests)
         given["current"] = match_map.read(target).surface_map

@@ -4,9 +4,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from . import job_table, match_collect, transfer_collect
+from . import job_table, match_collect, match_features, transfer_collect
 
-STARTS = ("automatic", "landmarks", "nearest", "aligned", "uvs", "file")
+STARTS = ("automatic", "landmarks", "nearest", "aligned", "uvs", "file", "features")
 PARTS = ("uvs", "weights", "colours", "keys", "fit")
 
 
@@ -45,6 +45,18 @@ def _pairs(table):
     return tuple(map(tuple, pairs))
 
 
+def _features(table, folder, start):
+    """Return the epochs and the model, a name or a file in `folder`."""
+    for key in ("epochs", "model"):
+        if table.has(key) and start != "features":
+            raise table.error(key, 'may be given with start = "features" only')
+    epochs = table.take("epochs", int, match_features.EPOCHS)
+    if epochs < 0:
+        raise table.error("epochs", f"must be 0 or more, not {epochs}")
+    model = table.take("model", str, match_features.MODEL)
+    return epochs, str(folder / model) if model.endswith(".safetensors") else model
+
+
 def _options(table, folder, targets):
     start = table.choice("start", STARTS, "automatic")
     file, pairs = table.path("file", folder), _pairs(table)
@@ -53,9 +65,9 @@ def _options(table, folder, targets):
             raise table.error(key, f'must be given with start = "{key}", and only then')
         if value and len(targets) > 1:
             raise table.error(key, f"fits one target, not {len(targets)}")
-    return match_collect.Options(
-        start.upper(), table.take("refine", bool, True), pairs, str(file or "")
-    )
+    refine = table.take("refine", bool, True)
+    learned = _features(table, folder, start)
+    return match_collect.Options(start.upper(), refine, pairs, str(file or ""), *learned)
 
 
 def _transfer(table):

@@ -1,12 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Operators that make a map, refine it, turn it round, save it and load it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
 from bpy.props import StringProperty
 
-from . import match, match_collect, match_map, match_show, match_solving, mesh_data, native
+from . import (
+    match,
+    match_collect,
+    match_map,
+    match_preview,
+    match_show,
+    match_solving,
+    mesh_data,
+    native,
+)
 from .background import LongOperator
 from .errors import UserError
 from .handle_operators import HandleOperator
@@ -16,7 +26,13 @@ SUFFIX = ".supplemap"
 
 
 class MatchOperator(LongOperator):
-    """Solves a match of the chosen objects and keeps it. Subclasses say from where it starts."""
+    """Solves a match of the chosen objects and keeps it. Subclasses say from where it starts.
+
+    In a window, colours show what adapting features say so far.
+    """
+
+    _preview = None
+    _view = None
 
     def how(self, context):
         raise NotImplementedError
@@ -28,6 +44,28 @@ class MatchOperator(LongOperator):
     def compute(self, inputs, stages):
         return match.solve(inputs, stages)
 
+    def invoke(self, context, event):
+        result = super().invoke(context, event)
+        if result == {"RUNNING_MODAL"} and context.scene.supple_match.preview:
+            self._view = context.space_data
+            pair = match_collect.chosen(context)
+            self._stages.learning.is_previewed = match_preview.is_possible(*pair, self._view)
+        return result
+
+    def watch(self, context):
+        point_map = self._stages.learning.take()
+        if point_map is None:
+            return
+        if self._preview is None:
+            inputs = self._inputs
+            self._preview = match_preview.Preview(inputs.source, inputs.target, self._view)
+        self._preview.update(point_map)
+
+    def _leave(self, context):
+        if self._preview is not None:
+            self._preview.end()
+        super()._leave(context)
+
     def write(self, context, inputs, result):
         source = find_unchanged(inputs.source.name, inputs.source)
         target = find_unchanged(inputs.target.name, inputs.target)
@@ -37,7 +75,9 @@ class MatchOperator(LongOperator):
         verb = "refined" if inputs.start == "CURRENT" else "matched"
         confidence = f"confidence {target.supple_map.confidence:.2f}"
         text = f"{target.name}: {verb} to '{source.name}', {confidence}"
-        return ("WARNING" if result.notes else "INFO"), ". ".join([text, *result.notes])
+        if not result.notes:
+            return "INFO", text
+        return "WARNING", " ".join([f"{text}.", *result.notes])
 
 
 class SUPPLE_OT_match(MatchOperator, bpy.types.Operator):
@@ -49,6 +89,17 @@ class SUPPLE_OT_match(MatchOperator, bpy.types.Operator):
 
     def how(self, context):
         return match_collect.options_of(context.scene)
+
+
+class SUPPLE_OT_find_correspondence(MatchOperator, bpy.types.Operator):
+    """Let learned features adapt to the two shapes, and match them by these, whatever Start says"""
+
+    bl_idname = "supple.find_correspondence"
+    bl_label = "Find Correspondence"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def how(self, context):
+        return replace(match_collect.options_of(context.scene), start=match.FEATURES)
 
 
 class SUPPLE_OT_refine_match(MatchOperator, bpy.types.Operator):
@@ -164,6 +215,7 @@ class SUPPLE_OT_match_swap(PairOperator, bpy.types.Operator):
 register, unregister = bpy.utils.register_classes_factory(
     (
         SUPPLE_OT_match,
+        SUPPLE_OT_find_correspondence,
         SUPPLE_OT_refine_match,
         SUPPLE_OT_match_load,
         SUPPLE_OT_match_save,

@@ -3,14 +3,16 @@
 
 import bpy
 
-from . import background, match_collect, match_map, match_show, native
+from . import background, loss_curve, match_collect, match_map, match_show, native
 from .landmark_click import SUPPLE_OT_landmark_click
 from .landmark_operators import (
     SUPPLE_OT_landmark_add,
     SUPPLE_OT_landmark_remove,
     SUPPLE_OT_landmarks_clear,
 )
+from .match import FEATURES
 from .match_operators import (
+    SUPPLE_OT_find_correspondence,
     SUPPLE_OT_match,
     SUPPLE_OT_match_load,
     SUPPLE_OT_match_save,
@@ -39,7 +41,10 @@ class SUPPLE_PT_match(Sidebar, bpy.types.Panel):
         return not native.problem()
 
     def draw(self, context):
-        layout = self.layout
+        learning = background.running and background.running.learning
+        if learning and learning.epochs:
+            self._draw_learning(self.layout.box().column(align=True), learning)
+        layout = self.layout.column()
         layout.enabled = background.running is None
         settings = context.scene.supple_match
         source = match_collect.source_chosen(context)
@@ -47,14 +52,23 @@ class SUPPLE_PT_match(Sidebar, bpy.types.Panel):
         self._draw_objects(layout, settings, source, target)
         self._draw_start(layout, settings)
         kept = target is not None and match_map.source_of(target) == source is not None
-        row = layout.row(align=True)
+        is_learned = settings.start == FEATURES
+        row = layout.column(align=True) if is_learned else layout.row(align=True)
         row.scale_y = 1.3
-        row.operator(SUPPLE_OT_match.bl_idname)
+        main = SUPPLE_OT_find_correspondence if is_learned else SUPPLE_OT_match
+        row.operator(main.bl_idname)
         again = row.row(align=True)
         again.enabled = kept
         again.operator(SUPPLE_OT_refine_match.bl_idname)
         if kept:
             self._draw_map(layout, target)
+
+    def _draw_learning(self, layout, learning):
+        """Draw the losses so far."""
+        layout.label(text=f"{len(learning.losses)} of {learning.epochs} epochs")
+        if learning.losses:
+            layout.label(text=loss_curve.curve(learning.losses))
+            layout.label(text=loss_curve.figures(learning.losses))
 
     def _draw_objects(self, layout, settings, source, target):
         for name, obj in (("source", source), ("target", target)):
@@ -101,6 +115,26 @@ class SUPPLE_PT_match(Sidebar, bpy.types.Panel):
             draw_text(layout, target.supple_map.notes, "ERROR")
 
 
+class SUPPLE_PT_match_advanced(Sidebar, bpy.types.Panel):
+    bl_label = "Advanced"
+    bl_parent_id = "SUPPLE_PT_match"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return context.scene.supple_match.start == FEATURES
+
+    def draw(self, context):
+        layout = self.layout
+        layout.enabled = background.running is None
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        settings = context.scene.supple_match
+        layout.prop(settings, "epochs")
+        layout.prop(settings, "preview")
+        layout.prop(settings, "model")
+
+
 class SUPPLE_PT_transfer(Sidebar, bpy.types.Panel):
     bl_label = "Transfer"
     bl_parent_id = "SUPPLE_PT_match"
@@ -121,5 +155,5 @@ class SUPPLE_PT_transfer(Sidebar, bpy.types.Panel):
 
 
 register, unregister = bpy.utils.register_classes_factory(
-    (SUPPLE_UL_pairs, SUPPLE_PT_match, SUPPLE_PT_transfer)
+    (SUPPLE_UL_pairs, SUPPLE_PT_match, SUPPLE_PT_match_advanced, SUPPLE_PT_transfer)
 )

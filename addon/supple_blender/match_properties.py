@@ -12,7 +12,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import compat
+from . import compat, match_features
 
 STARTS = (
     ("AUTOMATIC", "Automatic", "From the two shapes alone, in whatever pose and place they are"),
@@ -21,6 +21,8 @@ STARTS = (
     ("ALIGNED", "Nearest, Aligned", "The nearest point, once one is laid on the other"),
     ("UVS", "Shared UVs", "The same place in the active UV maps, which share a layout"),
     ("FILE", "File", "A map that was saved before"),
+    # Files keep the number of a start: new ones come last.
+    ("FEATURES", "Features", "Learned features, which adapt to the two shapes"),
 )
 PARTS = (
     ("UVS", "UVs", "All UV maps; seams stay seams"),
@@ -72,6 +74,25 @@ class SUPPLE_PG_match(bpy.types.PropertyGroup):
         description="The map that the match starts from",
         subtype="FILE_PATH",
         options=compat.RELATIVE_PATH,
+    )
+    epochs: IntProperty(
+        name="Epochs",
+        description="How long the features adapt to the two shapes; 0 takes them as they are",
+        default=match_features.EPOCHS,
+        min=0,
+        soft_max=100,
+    )
+    model: StringProperty(
+        name="Model",
+        description="Features that were learned: the name of shipped ones, or a file",
+        subtype="FILE_PATH",
+        default=match_features.MODEL,
+        options=compat.RELATIVE_PATH,
+    )
+    preview: BoolProperty(
+        name="Preview",
+        description="Show the match as colours in the 3D View while the features adapt",
+        default=True,
     )
     pairs: CollectionProperty(type=SUPPLE_PG_pair)
     active_pair: IntProperty(name="Active Pair")

@@ -2,8 +2,31 @@
 """Progress of a computation with several native calls, readable from another thread."""
 
 import time
+from dataclasses import dataclass, field
 
 from . import native
+
+
+@dataclass
+class Learning:
+    """What is learned during a computation: its thread writes, the window's reads.
+
+    epochs: how many there will be. losses: of those that are done. is_previewed: somebody takes
+    `point_map`, the newest of what the panel calls a match, (n,) or None.
+    """
+
+    epochs: int = 0
+    losses: list = field(default_factory=list)
+    is_previewed: bool = False
+    point_map: object = None
+
+    def begin(self, epochs):
+        self.epochs, self.losses, self.point_map = epochs, [], None
+
+    def take(self):
+        """Return the newest point map, or None where it was taken before."""
+        found, self.point_map = self.point_map, None
+        return found
 
 
 class Stages:
@@ -11,6 +34,7 @@ class Stages:
 
     def __init__(self):
         self.label = ""
+        self.learning = Learning()
         self._done = 0.0
         self._share = 0.0
         self._progress = None
@@ -64,6 +88,10 @@ class Part:
 
     def begin(self, label, share):
         return self._stages.begin(label, share * self._share)
+
+    @property
+    def learning(self):
+        return self._stages.learning
 
     @property
     def cancelled(self):
