@@ -2,7 +2,9 @@
 """`supple match` and `supple evaluate match`, on a blob and a copy of it in another pose,
 triangulation, order and place."""
 
+import _thread
 import json
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +13,7 @@ import supple
 from supple import evaluation
 from supple.cases import read_mesh, write_mesh
 from supple.cli import app
+from supple.cli.console import watched
 from supple.match_sets import read_match_set
 from typer.testing import CliRunner
 
@@ -160,3 +163,20 @@ def test_unknown_losses_are_named(folder):
     result = run("evaluate", "match", folder, *model, "--configs", "ljn,magic")
     assert result.exit_code == 1
     assert "'magic' is no configuration" in " ".join(result.output.split())
+
+
+def test_ctrl_c_cancels_and_waits_for_what_was_started():
+    ended = []
+
+    def work(progress):
+        _thread.interrupt_main()
+        for _ in range(10_000):  # not for ever, should nobody cancel
+            time.sleep(0.001)
+            if progress.cancelled:
+                break
+        time.sleep(0.1)  # the way back from the last thing that cannot be stopped
+        ended.append(progress.cancelled)
+
+    with pytest.raises(KeyboardInterrupt):
+        watched("working", work)
+    assert ended == [True]

@@ -16,18 +16,28 @@ import scipy.sparse
 
 __all__: list[str] = [
     "Architecture",
+    "DiffusionSizes",
     "EditOptions",
     "EditReport",
     "EditSession",
     "Editor",
     "EmbeddingRecovery",
     "Geodesics",
+    "GuideMaps",
+    "GuidePair",
     "Handle",
     "HandleTarget",
     "InitialMap",
+    "JointEpoch",
+    "JointTrainOptions",
+    "JointTrainer",
     "KeptFrames",
     "MapScore",
     "MatchDirection",
+    "MatchNetworks",
+    "MatchOptions",
+    "MatchResult",
+    "Matcher",
     "Network",
     "Note",
     "PointCacheReader",
@@ -68,6 +78,7 @@ __all__: list[str] = [
     "functional_map",
     "geodesic_errors",
     "gradient",
+    "guide_maps",
     "handle_frames",
     "jacobians",
     "landmark_map",
@@ -1060,3 +1071,191 @@ class KeptFrames:
         self, key: str
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]"] | None: ...
     def size(self) -> int: ...
+
+class DiffusionSizes:
+    def __init__(
+        self,
+        inputs: typing.SupportsInt | typing.SupportsIndex = 128,
+        outputs: typing.SupportsInt | typing.SupportsIndex = 256,
+        width: typing.SupportsInt | typing.SupportsIndex = 128,
+        blocks: typing.SupportsInt | typing.SupportsIndex = 4,
+    ) -> None: ...
+    @property
+    def inputs(self) -> int: ...
+    @property
+    def outputs(self) -> int: ...
+    @property
+    def width(self) -> int: ...
+    @property
+    def blocks(self) -> int: ...
+
+class MatchNetworks:
+    def __init__(
+        self,
+        input: str,
+        sizes: DiffusionSizes,
+        eigenfunctions: typing.SupportsInt | typing.SupportsIndex,
+        tensors: collections.abc.Mapping[
+            str, typing.Annotated[numpy.typing.ArrayLike, numpy.float32, "[m, n]"]
+        ],
+        network: Network | None,
+    ) -> None: ...
+    @staticmethod
+    def untrained(
+        input: str,
+        sizes: DiffusionSizes,
+        eigenfunctions: typing.SupportsInt | typing.SupportsIndex,
+        seed: typing.SupportsInt | typing.SupportsIndex,
+        network: Network | None,
+    ) -> MatchNetworks: ...
+    @property
+    def input(self) -> str: ...
+    @property
+    def sizes(self) -> DiffusionSizes: ...
+    @property
+    def eigenfunctions(self) -> int: ...
+    @property
+    def network(self) -> Network | None: ...
+    def tensors(
+        self,
+    ) -> dict[str, typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]"]]: ...
+    def features(
+        self, mesh: PreparedMesh
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]"]: ...
+
+class GuidePair:
+    def __init__(
+        self,
+        first: typing.SupportsInt | typing.SupportsIndex,
+        second: typing.SupportsInt | typing.SupportsIndex,
+        there: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        back: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    ) -> None: ...
+
+class GuideMaps:
+    @property
+    def point_maps(
+        self,
+    ) -> typing.Annotated[
+        list[typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]], "FixedSize(2)"
+    ]: ...
+    @property
+    def maps(
+        self,
+    ) -> typing.Annotated[
+        list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]], "FixedSize(2)"
+    ]: ...
+    @property
+    def round_trip(self) -> float: ...
+
+def guide_maps(
+    first: PreparedMesh,
+    second: PreparedMesh,
+    functions: typing.SupportsInt | typing.SupportsIndex,
+    progress: Progress | None = None,
+    part: collections.abc.Sequence[float] = (0.0, 1.0),
+) -> GuideMaps: ...
+
+class JointTrainOptions:
+    loss: UnsupervisedOptions
+    epochs: int
+    guided_epochs: int
+    guide_weight: float
+    feature_learning_rate: collections.abc.Sequence[float]
+    jacobian_learning_rate: collections.abc.Sequence[float]
+    largest_gradient: float
+    patience: int
+    seed: int
+    def __init__(self) -> None: ...
+
+class JointEpoch:
+    def __init__(
+        self,
+        epoch: typing.SupportsInt | typing.SupportsIndex,
+        pairs: typing.SupportsInt | typing.SupportsIndex,
+        guide: typing.SupportsFloat | typing.SupportsIndex,
+        guide_share: typing.SupportsFloat | typing.SupportsIndex,
+        terms: collections.abc.Sequence[float],
+    ) -> None: ...
+    @property
+    def epoch(self) -> int: ...
+    @property
+    def pairs(self) -> int: ...
+    @property
+    def guide(self) -> float: ...
+    @property
+    def guide_share(self) -> float: ...
+    @property
+    def terms(self) -> typing.Annotated[list[float], "FixedSize(7)"]: ...
+
+class JointTrainer:
+    def __init__(
+        self,
+        meshes: collections.abc.Sequence[PreparedMesh],
+        groups: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
+        guides: collections.abc.Sequence[GuidePair],
+        networks: MatchNetworks,
+        options: JointTrainOptions,
+        functions: typing.SupportsInt | typing.SupportsIndex,
+    ) -> None: ...
+    @property
+    def finished(self) -> bool: ...
+    @property
+    def history(self) -> list[JointEpoch]: ...
+    def epoch(
+        self,
+        progress: Progress | None = None,
+        part: collections.abc.Sequence[float] = (0.0, 1.0),
+    ) -> JointEpoch: ...
+    def networks(self) -> MatchNetworks: ...
+    def state(
+        self,
+    ) -> dict[str, typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]"]]: ...
+    def restore(
+        self,
+        state: collections.abc.Mapping[
+            str, typing.Annotated[numpy.typing.ArrayLike, numpy.float32, "[m, n]"]
+        ],
+        history: collections.abc.Sequence[JointEpoch],
+    ) -> None: ...
+
+class MatchOptions:
+    training: JointTrainOptions
+    functions: int
+    automatic: bool
+    refine: RefineOptions
+    def __init__(self) -> None: ...
+
+class MatchResult:
+    @property
+    def initial(self) -> InitialMap: ...
+    @property
+    def automatic(self) -> bool: ...
+    @property
+    def refined(self) -> RefineResult: ...
+
+class Matcher:
+    def __init__(
+        self,
+        source: PreparedMesh,
+        target: PreparedMesh,
+        networks: MatchNetworks,
+        options: MatchOptions,
+        progress: Progress | None = None,
+    ) -> None: ...
+    @property
+    def history(self) -> list[JointEpoch]: ...
+    @property
+    def notes(self) -> list[Note]: ...
+    def networks(self) -> MatchNetworks: ...
+    def features_map(self, progress: Progress | None = None) -> InitialMap: ...
+    def adapt(
+        self,
+        watch: collections.abc.Callable[[JointEpoch], None] | None = None,
+        progress: Progress | None = None,
+    ) -> None: ...
+    def run(
+        self,
+        watch: collections.abc.Callable[[JointEpoch], None] | None = None,
+        progress: Progress | None = None,
+    ) -> MatchResult: ...

@@ -38,6 +38,8 @@ class LatestLoss:
 
     def __call__(self, epoch: Epoch) -> None:
         self._text = f"epoch {epoch.epoch + 1}, loss {epoch.loss['total']:.4g}"
+        if epoch.guide_share > 0:
+            self._text += f", to the guides {epoch.guide:.4g}"
 
     def __str__(self) -> str:
         return self._text
@@ -50,25 +52,27 @@ def watched(label: str, work: Callable[[supple.Progress], _Result], note: object
     """
     progress = supple.Progress()
     outcome: dict[str, object] = {}
+    ended = threading.Event()  # a join that Ctrl+C interrupts takes the thread for ended
 
     def run() -> None:
         try:
             outcome["result"] = work(progress)
         except BaseException as error:  # handed to the caller's thread below
             outcome["error"] = error
+        finally:
+            ended.set()
 
     thread = threading.Thread(target=run)
     with progress_bar() as bar:
         task = bar.add_task(label, total=1.0)
-        thread.start()
         try:
-            while thread.is_alive():
-                thread.join(0.05)
+            thread.start()
+            while not ended.wait(0.05):
                 text = f"{label} {note}".rstrip()
                 bar.update(task, description=text, completed=progress.fraction)
         except KeyboardInterrupt:
             progress.cancel()
-            thread.join()
+            ended.wait()
             raise
     if "error" in outcome:
         raise outcome["error"]
