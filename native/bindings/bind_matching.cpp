@@ -121,6 +121,7 @@ void bind_matching(py::module_& module) {
       .def(py::init<>())
       .def_readwrite("loss", &JointTrainOptions::loss)
       .def_readwrite("epochs", &JointTrainOptions::epochs)
+      .def_readwrite("first_temperature", &JointTrainOptions::first_temperature)
       .def_readwrite("guided_epochs", &JointTrainOptions::guided_epochs)
       .def_readwrite("guide_weight", &JointTrainOptions::guide_weight)
       .def_readwrite("feature_learning_rate", &JointTrainOptions::feature_learning_rate)

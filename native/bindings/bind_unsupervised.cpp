@@ -57,6 +57,7 @@ void bind_unsupervised(py::module_& module) {
   py::class_<UnsupervisedOptions>(module, "UnsupervisedOptions")
       .def(py::init<>())
       .def_readwrite("temperature", &UnsupervisedOptions::temperature)
+      .def_readwrite("smooth_features", &UnsupervisedOptions::smooth_features)
       .def_property(
           "map_penalty", [](const UnsupervisedOptions& o) { return to_string(o.map.penalty); },
           [](UnsupervisedOptions& o, const std::string& name) {

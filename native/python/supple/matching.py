@@ -128,8 +128,13 @@ class Matcher:
         options.training.seed = seed
         options.automatic = automatic
         self._metadata = model.metadata
+        options.functions = functions_of(config)
         self._native = _native.Matcher(
-            self.source.native, self.target.native, model.native, options, progress
+            self.source.native,
+            self.target.native,
+            _adapted_by(model.native, config),
+            options,
+            progress,
         )
         self.epochs = epochs
         self.notes = [Note(note.code, note.count, note.message) for note in self._native.notes]
@@ -218,4 +223,21 @@ def configure(training: _native.JointTrainOptions, config: str) -> None:
         loss.jacobian_weights = [0.0, 0.0, 0.0]
     if config in ("ulrssm", "cdfm"):
         loss.bijectivity = 1.0
+    if config == "cdfm":
+        loss.smooth_features = True
+        loss.temperature = 1.0 / 50.0
+        training.first_temperature = 1.0
     training.loss = loss
+
+
+def functions_of(config: str) -> int:
+    """Eigenfunctions of a configuration's functional maps, as published."""
+    return 50 if config == "cdfm" else 80
+
+
+def _adapted_by(native: _native.MatchNetworks, config: str) -> _native.MatchNetworks:
+    """The networks that a configuration has: all but "ljn" are without the second one."""
+    if config == "ljn":
+        return native
+    tensors = native.tensors()
+    return _native.MatchNetworks(native.input, native.sizes, native.eigenfunctions, tensors, None)

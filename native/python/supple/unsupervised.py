@@ -11,7 +11,7 @@ from . import _native
 from .checkpoints import Checkpoint, FoundGuide, digest
 from .errors import SuppleError
 from .match_model import MatchModel, load_match_model, untrained_match_model
-from .matching import TERMS, Epoch, configure, epoch_of
+from .matching import TERMS, Epoch, configure, epoch_of, functions_of
 from .mesh import PreparedMesh
 
 LARGEST_ROUND_TRIP = 0.06
@@ -49,7 +49,7 @@ def train_unsupervised(
     epochs: int = 20,
     guided_epochs: int | None = None,
     guide_pairs: int = 3,
-    functions: int = 80,
+    functions: int | None = None,
     feature_learning_rate: tuple[float, float] = (1e-3, 1e-4),
     jacobian_learning_rate: tuple[float, float] = (1e-4, 1e-5),
     patience: int = 0,
@@ -74,7 +74,8 @@ def train_unsupervised(
             (automatic_map both ways; seconds a pair). None for 5 where model is None, or else 0.
         guide_pairs: rough maps are looked for between each shape and so many others of its group,
             drawn from the seed. Those of round trip LARGEST_ROUND_TRIP or more are left out.
-        functions: eigenfunctions of functional maps and of the signal.
+        functions: eigenfunctions of functional maps and of the signal; None for the
+            configuration's.
         feature_learning_rate, jacobian_learning_rate: first and last; between them the same factor
             every step.
         patience: end after so many epochs, not counting guided ones, without a smaller mean loss;
@@ -92,6 +93,7 @@ def train_unsupervised(
         Cancelled: if progress was cancelled; the checkpoint keeps every epoch that was finished.
     """
     start = _start(model, config, seed, metadata or {})
+    functions = functions_of(config) if functions is None else functions
     if guided_epochs is None:
         guided_epochs = min(_GUIDED_EPOCHS, epochs) if model is None else 0
     options = _native.JointTrainOptions()

@@ -36,10 +36,11 @@ void check(const JointTrainOptions& options) {
     return rate[0] > 0.0 && rate[1] > 0.0 && std::isfinite(rate[0]) && std::isfinite(rate[1]);
   });
   if (options.epochs < 1 || options.guided_epochs < 0 || options.guide_weight < 0.0 ||
-      options.largest_gradient < 0.0 || options.patience < 0 || !rates_fit) {
+      options.largest_gradient < 0.0 || options.patience < 0 || options.first_temperature < 0.0 ||
+      !rates_fit) {
     throw Error(ErrorCode::bad_option,
                 "Training needs 1 epoch or more, learning rates above 0, and guided epochs, guide "
-                "weight, largest gradient and patience of 0 or more.");
+                "weight, first temperature, largest gradient and patience of 0 or more.");
   }
 }
 
@@ -96,15 +97,6 @@ double squared_length(const LayerParameters<float>& gradient) {
            gradient.biases[l].cast<double>().squaredNorm();
   }
   return sum;
-}
-
-UnsupervisedOptions times(UnsupervisedOptions options, double share) {
-  for (double* weight :
-       {&options.orthogonality, &options.coupling, &options.bijectivity, &options.jacobians.fit,
-        &options.jacobians.smoothness, &options.jacobians.determinant}) {
-    *weight *= share;
-  }
-  return options;
 }
 
 void add(UnsupervisedLossValues& sum, const UnsupervisedLossValues& one, double share) {
@@ -176,6 +168,22 @@ double JointTrainer::guide_share(int epoch) const {
     return 0.0;
   }
   return 1.0 - static_cast<double>(epoch) / options_.guided_epochs;
+}
+
+UnsupervisedOptions JointTrainer::loss_of(int epoch) const {
+  UnsupervisedOptions loss = options_.loss;
+  const double share = 1.0 - guide_share(epoch);
+  for (double* weight :
+       {&loss.orthogonality, &loss.coupling, &loss.bijectivity, &loss.jacobians.fit,
+        &loss.jacobians.smoothness, &loss.jacobians.determinant}) {
+    *weight *= share;
+  }
+  if (options_.first_temperature > 0.0 && options_.epochs > 1) {
+    const double done = static_cast<double>(epoch) / (options_.epochs - 1);
+    loss.temperature =
+        1.0 / ((1.0 - done) / options_.first_temperature + done / options_.loss.temperature);
+  }
+  return loss;
 }
 
 bool JointTrainer::finished() const {
@@ -261,7 +269,7 @@ const JointEpoch& JointTrainer::epoch(ProgressRange progress, const Watch& watch
   JointEpoch result;
   result.epoch = static_cast<int>(history_.size());
   result.guide_share = guide_share(result.epoch);
-  const UnsupervisedOptions scaled = times(options_.loss, 1.0 - result.guide_share);
+  const UnsupervisedOptions now = loss_of(result.epoch);
   const std::vector<Step> steps = steps_of(result.epoch);
   result.pairs = static_cast<int>(steps.size());
   const double share = 1.0 / static_cast<double>(steps.size());
@@ -277,7 +285,7 @@ const JointEpoch& JointTrainer::epoch(ProgressRange progress, const Watch& watch
           joint_loss(networks_,
                      {surfaces_[static_cast<size_t>(step.first)].get(),
                       surfaces_[static_cast<size_t>(step.second)].get()},
-                     scaled, guide, &gradient,
+                     now, guide, &gradient,
                      progress.stage("training", share * static_cast<double>(s),
                                     share * static_cast<double>(s + 1)));
       if (!std::isfinite(loss.total())) {
@@ -286,7 +294,7 @@ const JointEpoch& JointTrainer::epoch(ProgressRange progress, const Watch& watch
                                                " and " + std::to_string(step.second) +
                                                " is not a number. Use a smaller learning rate.");
       }
-      update(gradient, scaled, result.epoch * pairs_per_epoch() + static_cast<int>(s));
+      update(gradient, now, result.epoch * pairs_per_epoch() + static_cast<int>(s));
       add(result.loss.terms, loss.terms, share);
       result.loss.guide += share * loss.guide;
       if (watch) {

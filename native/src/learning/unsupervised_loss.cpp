@@ -122,6 +122,25 @@ MatchSurface::MatchSurface(const SurfaceOperators& operators_in, const Eigenbasi
   adjacency = face_adjacency(operators->faces, operators->corners);
 }
 
+namespace {
+
+// What the soft maps compare.
+template <class Scalar>
+FeaturePair<Scalar> compared(const SurfacePair& surfaces, const FeaturePair<Scalar>& features,
+                             const std::array<RowMatrix<double>, 2>& coefficients,
+                             const UnsupervisedOptions& options) {
+  if (!options.smooth_features) {
+    return features;
+  }
+  FeaturePair<Scalar> result;
+  for (size_t s = 0; s < 2; ++s) {
+    result[s] = product(surfaces[s]->functions, coefficients[s]).template cast<Scalar>();
+  }
+  return result;
+}
+
+}  // namespace
+
 template <class Scalar>
 Match match(const SurfacePair& surfaces, const FeaturePair<Scalar>& features,
             const UnsupervisedOptions& options, ProgressRange progress) {
@@ -133,7 +152,8 @@ Match match(const SurfacePair& surfaces, const FeaturePair<Scalar>& features,
         feature_map(coefficients[d], coefficients[1 - d],
                     map_penalties(surfaces[d]->values, surfaces[1 - d]->values, options.map));
   }
-  const SoftMapPair<Scalar> soft(features[0], features[1], options.temperature,
+  const FeaturePair<Scalar> seen = compared(surfaces, features, coefficients, options);
+  const SoftMapPair<Scalar> soft(seen[0], seen[1], options.temperature,
                                  progress.stage("soft map", 0.0, 0.3));
   const auto pulled =
       soft.apply(carried_by<Scalar>(surfaces), progress.stage("soft map", 0.3, 1.0));
@@ -177,12 +197,18 @@ FeaturePair<Scalar> match_backward(const SurfacePair& surfaces, const FeaturePai
     pulled[d] = {forward[d].carried.template cast<Scalar>(),
                  forward[d].sums.template cast<Scalar>()};
   }
-  const SoftMapPair<Scalar> soft(features[0], features[1], options.temperature,
+  const FeaturePair<Scalar> seen = compared(surfaces, features, coefficients, options);
+  const SoftMapPair<Scalar> soft(seen[0], seen[1], options.temperature,
                                  progress.stage("derivative of the soft map", 0.0, 0.2));
   FeaturePair<Scalar> result =
       soft.backward(carried_by<Scalar>(surfaces), pulled, of_carried,
                     progress.stage("derivative of the soft map", 0.2, 1.0));
   for (size_t s = 0; s < 2; ++s) {
+    if (options.smooth_features) {
+      of_coefficients[s] +=
+          transposed_times(surfaces[s]->functions, result[s].template cast<double>());
+      result[s].setZero();
+    }
     result[s] += product(surfaces[s]->weighted, of_coefficients[s]).template cast<Scalar>();
   }
   return result;

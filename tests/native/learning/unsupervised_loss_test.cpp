@@ -173,6 +173,36 @@ class UnsupervisedLoss : public ::testing::Test {
     return unsupervised_loss(pair, match(pair, features, options), predicted, options).total;
   }
 
+  // Of the match, each weighed by noise.
+  void check_every_output() {
+    const Match forward = match(pair, features, options);
+    Match direction;
+    for (size_t d = 0; d < 2; ++d) {
+      const auto like = [&](const auto& matrix, uint64_t seed) {
+        return test::noise(matrix.rows(), matrix.cols(), seed);
+      };
+      direction[d] = {like(forward[d].map, 1), like(forward[d].soft_map, 2),
+                      Points(like(forward[d].pulled, 3)), Points(like(forward[d].coarse, 4))};
+    }
+    const auto value = [&] {
+      const Match now = match(pair, features, options);
+      double sum = 0.0;
+      for (size_t d = 0; d < 2; ++d) {
+        sum += now[d].map.cwiseProduct(direction[d].map).sum() +
+               now[d].soft_map.cwiseProduct(direction[d].soft_map).sum() +
+               now[d].pulled.cwiseProduct(direction[d].pulled).sum() +
+               now[d].coarse.cwiseProduct(direction[d].coarse).sum();
+      }
+      return sum;
+    };
+    const FeaturePair<double> gradient =
+        match_backward(pair, features, forward, direction, options);
+    for (size_t d = 0; d < 2; ++d) {
+      EXPECT_TRUE(test::gradient_matches(value, test::values_of(features[d]),
+                                         test::values_of(gradient[d]), 60));
+    }
+  }
+
   test::Threads threads{1};  // far too small to share
   Surface first, second;
   SurfacePair pair;
@@ -196,31 +226,9 @@ TEST_F(UnsupervisedLoss, Gradient) {
 }
 
 TEST_F(UnsupervisedLoss, GradientOfEveryOutputOfTheMatch) {
-  const Match forward = match(pair, features, options);
-  Match direction;
-  for (size_t d = 0; d < 2; ++d) {
-    const auto like = [&](const auto& matrix, uint64_t seed) {
-      return test::noise(matrix.rows(), matrix.cols(), seed);
-    };
-    direction[d] = {like(forward[d].map, 1), like(forward[d].soft_map, 2),
-                    Points(like(forward[d].pulled, 3)), Points(like(forward[d].coarse, 4))};
-  }
-  const auto value = [&] {
-    const Match now = match(pair, features, options);
-    double sum = 0.0;
-    for (size_t d = 0; d < 2; ++d) {
-      sum += now[d].map.cwiseProduct(direction[d].map).sum() +
-             now[d].soft_map.cwiseProduct(direction[d].soft_map).sum() +
-             now[d].pulled.cwiseProduct(direction[d].pulled).sum() +
-             now[d].coarse.cwiseProduct(direction[d].coarse).sum();
-    }
-    return sum;
-  };
-  const FeaturePair<double> gradient = match_backward(pair, features, forward, direction, options);
-  for (size_t d = 0; d < 2; ++d) {
-    EXPECT_TRUE(test::gradient_matches(value, test::values_of(features[d]),
-                                       test::values_of(gradient[d]), 60));
-  }
+  check_every_output();
+  options.smooth_features = true;
+  check_every_output();
 }
 
 TEST_F(UnsupervisedLoss, EmptyGradientsAreZero) {

@@ -25,6 +25,9 @@ struct GuidePair {
 struct JointTrainOptions {
   UnsupervisedOptions loss;  ///< the paper's weights
   int epochs = 20;           ///< >= 1
+  /// If above 0, the temperature of the first epoch; its inverse goes by equal steps to that of
+  /// `loss.temperature` in the last. 0: the same throughout.
+  double first_temperature = 0.0;
   /// Epochs at the start that take their pairs from the guides; without guides there are none.
   /// Their share s of the loss falls by equal steps from 1 in the first of these epochs to 0 after
   /// the last: s guide_weight |C' - guide|^2 + (1 - s) loss.
@@ -92,6 +95,7 @@ class JointTrainer {
   };
   std::vector<Step> steps_of(int epoch) const;
   double guide_share(int epoch) const;
+  UnsupervisedOptions loss_of(int epoch) const;
   void update(const JointGradient<float>& gradient, const UnsupervisedOptions& loss, int step);
 
   std::vector<std::shared_ptr<const Surface>> surfaces_;

@@ -39,9 +39,13 @@ using SurfacePair = std::array<const MatchSurface*, 2>;
 
 struct UnsupervisedOptions {
   double temperature = 0.07;  ///< of the soft maps, > 0
+  /// Soft maps compare features projected to the surface's functions instead of the features as
+  /// they are, as Sun et al. 2023 do ("Spatially and Spectrally Consistent Deep Functional Maps").
+  bool smooth_features = false;
   FeatureMapOptions map;
   /// Weights of the terms; the defaults are the paper's. ULRSSM (Cao et al. 2023) is bijectivity 1
-  /// and all of `jacobians` 0.
+  /// and all of `jacobians` 0; CDFM (Sun et al. 2023) that with smooth features, 50 functions and a
+  /// temperature that falls from 1 to 1 / 50 (and distances where cosines are compared here).
   double orthogonality = 1.0;
   double coupling = 1.0;
   double bijectivity = 0.0;

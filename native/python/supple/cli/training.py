@@ -42,8 +42,13 @@ def train_unsupervised(
     ] = None,
     guide_pairs: Annotated[int, typer.Option(min=1, help="Rough maps to look for, a mesh.")] = 3,
     functions: Annotated[
-        int, typer.Option(min=1, help="Eigenfunctions of functional maps and of the signal.")
-    ] = 80,
+        int | None,
+        typer.Option(
+            min=1,
+            help="Eigenfunctions of functional maps and of the signal.",
+            show_default="80, or 50 for cdfm",
+        ),
+    ] = None,
     patience: Annotated[
         int, typer.Option(min=0, help="End after so many epochs without a smaller loss; 0: never.")
     ] = 0,

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "supple/tasks/match.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "native/learning/joint_surfaces.h"
+
+namespace supple {
+namespace {
+
+using Prepared = std::shared_ptr<const PreparedMesh>;
+
+// A body without symmetry, and the order that a copy's vertices were put in.
+class Matching : public ::testing::Test {
+ protected:
+  Matching() : mesh(zoo::perturbed_sphere(3, 5)) {
+    for (Eigen::Index i = 0; i < mesh.vertices.rows(); ++i) {
+      auto v = mesh.vertices.row(i);
+      const double head = std::exp(-6.0 * (v - Eigen::RowVector3d(1, 0, 0)).squaredNorm());
+      const double arm = std::exp(-8.0 * (v - Eigen::RowVector3d(0, 0.8, 0.6)).squaredNorm());
+      v *= 1.0 + 0.9 * head + 0.5 * arm;
+      v[2] *= 0.7;
+    }
+    order = Eigen::VectorXi::LinSpaced(mesh.vertices.rows(), 0,
+                                       static_cast<int>(mesh.vertices.rows()) - 1);
+    std::shuffle(order.begin(), order.end(), std::mt19937(3));
+    copy.vertices.resize(mesh.vertices.rows(), 3);
+    for (Eigen::Index i = 0; i < order.size(); ++i) {
+      copy.vertices.row(order[i]) = 2.0 * mesh.vertices.row(i) * test::rotation(2);
+    }
+    copy.faces = mesh.faces.unaryExpr([&](int v) { return order[v]; });
+    options.training.epochs = 2;
+    options.functions = 20;
+    options.refine.counts = {30, 40};
+    options.automatic = false;
+  }
+  static Prepared prepared(const zoo::Mesh& mesh) {
+    return std::make_shared<const PreparedMesh>(
+        mesh.vertices, mesh.faces, PrepareOptions{.eigenfunctions = 48, .samples = 200});
+  }
+  // Mean distance to the true image, in roots of the area of the copy.
+  double error(const Eigen::VectorXi& map) const {
+    const Points images = copy.vertices(map, Eigen::all), truth = copy.vertices(order, Eigen::all);
+    return (images - truth).rowwise().norm().mean() /
+           TriangleMesh(copy.vertices, copy.faces).scale();
+  }
+  MatchNetworks networks() const { return test::small_networks<float>(4); }
+
+  zoo::Mesh mesh, copy;
+  Eigen::VectorXi order;  // vertex of the copy for each of the mesh
+  MatchOptions options;
+};
+
+TEST_F(Matching, FindsACopySlow) {
+  options.automatic = true;
+  const Prepared a = prepared(mesh), b = prepared(copy);
+  Matcher matcher(a, b, networks(), options);
+  int epochs = 0;
+  const MatchResult result = matcher.run({}, [&](const JointEpoch& epoch) {
+    EXPECT_EQ(epoch.epoch, epochs++);
+    EXPECT_EQ(epoch.pairs, 2);
+  });
+  EXPECT_EQ(epochs, 2);
+  EXPECT_EQ(matcher.history().size(), 2u);
+  EXPECT_LT(error(result.refined.point_map), 0.01);
+  // The more plausible map is the one that was refined.
+  EXPECT_GE(result.initial.score.value(), automatic_map(*a, *b).score.value());
+  EXPECT_GE(result.initial.score.value(), matcher.features_map().score.value());
+}
+
+TEST_F(Matching, GoesOnAfterACancelledRunAndRepeatsItself) {
+  const Prepared a = prepared(mesh), b = prepared(copy);
+  Matcher stopped(a, b, networks(), options);
+  Progress progress;
+  EXPECT_TRUE(test::fails_with(ErrorCode::cancelled, {}, [&] {
+    stopped.run(ProgressRange(&progress), [&](const JointEpoch&) { progress.cancel(); });
+  }));
+  EXPECT_EQ(stopped.history().size(), 1u);
+  Matcher whole(a, b, networks(), options);
+  const MatchResult result = stopped.run();
+  EXPECT_FALSE(result.automatic);
+  EXPECT_EQ(result.refined.point_map, whole.run().refined.point_map);
+  EXPECT_EQ(stopped.networks().features.parameters.tensors(),
+            whole.networks().features.parameters.tensors());
+}
+
+TEST_F(Matching, GuidesLeadThereAndBackSlow) {
+  const Prepared a = prepared(mesh), b = prepared(copy);
+  const GuideMaps guides = guide_maps(*a, *b, 20);
+  EXPECT_LT(guides.round_trip, 0.05);
+  EXPECT_LT(error(guides.point_maps[0]), 0.1);
+  const auto surface = joint_surface(*a, networks(), 20);
+  EXPECT_EQ(guides.maps[0].rows(), surface->match.values.size());
+  // Back after there is nearly nothing, as for every map of equal areas.
+  const RowMatrix<double> product = guides.maps[0] * guides.maps[1];
+  EXPECT_LT((product - RowMatrix<double>::Identity(product.rows(), product.cols())).norm(), 1.0);
+}
+
+TEST_F(Matching, RefusesWhatItCannotDo) {
+  const Prepared a = prepared(mesh);
+  EXPECT_TRUE(test::fails_with(ErrorCode::bad_option, {"target", "missing"},
+                               [&] { Matcher(a, nullptr, networks(), options); }));
+  options.training.epochs = -1;
+  EXPECT_TRUE(test::fails_with(ErrorCode::bad_option, {"0 epochs"},
+                               [&] { Matcher(a, a, networks(), options); }));
+}
+
+}  // namespace
+}  // namespace supple
