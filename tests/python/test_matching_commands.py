@@ -121,7 +121,8 @@ def test_the_report_has_the_rows_and_columns(folder, tmp_path):
     report = json.loads(path.read_text())
     assert report["pairs"] == 1
     assert report["epochs"] == 1
-    assert list(report["rows"]) == ["automatic", "features", "without_ljn", "ljn"]
+    names = ["automatic", "features", "without_ljn", "no_network", "ljn"]
+    assert list(report["rows"]) == names
     for name, row in report["rows"].items():
         for column in (*evaluation.COLUMNS, evaluation.SECONDS, "flipped"):
             assert np.isfinite(row[column]), (name, column)

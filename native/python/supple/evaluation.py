@@ -18,7 +18,7 @@ from .model import Model
 from .refining import Refiner
 
 Map = NDArray[np.int32]
-INITIAL = "initial"
+INITIAL, NO_NETWORK = "initial", "no_network"
 # The columns of a report, and whether more is better.
 COLUMNS = {"geodesic": False, "inversion": False, "dirichlet": False, "coverage": True}
 SECONDS = "seconds_per_pair"
@@ -66,7 +66,7 @@ def methods(model: str | Model = "spectral", **options: object) -> list[Method]:
     classical ways. options: of Refiner."""
     return [
         Method("spectral_projection", _refiner(method="spectral_projection")),
-        Method("no_network", _refiner(model=None, **options)),
+        Method(NO_NETWORK, _refiner(model=None, **options)),
         Method("ljn", _refiner(model=model, **options)),
         Method("zoomout", _zoomout(sampled=False)),
         Method("zoomout_samples", _zoomout(sampled=True)),
@@ -76,28 +76,25 @@ def methods(model: str | Model = "spectral", **options: object) -> list[Method]:
 def match_methods(
     model: MatchModel, configs: Sequence[str], *, epochs: int = EPOCHS
 ) -> list[Method]:
-    """Ways to match without a map: "automatic" (no features), "features" (as they are), and one a
-    configuration of Matcher, adaptation included.
+    """Ways to match without a map: "automatic" (no features), "features" (as they are), and those
+    named by `configs`, adaptation included.
 
-    "ljn" is all that Matcher.run does. The others end with the functional map of the adapted
-    features; "without_ljn" is the paper's "W/o LJN".
+    "ljn" is all that Matcher.run does, and "no_network" the same with the identity in the network's
+    place when the map is refined. Other configurations of Matcher end with the functional map of
+    the adapted features; "without_ljn" is the paper's "W/o LJN".
 
     Raises:
         SuppleError: bad_option.
     """
+    ways = {NO_NETWORK: _unaided(model, epochs), "ljn": _matcher(model, epochs)}
     for config in configs:
-        configure(_native.JointTrainOptions(), config)
+        if config not in ways:
+            configure(_native.JointTrainOptions(), config)
+            ways[config] = _features(model, config, epochs)
     return [
         Method("automatic", _automatic, refines=False),
         Method("features", _features(model, "ljn", 0), refines=False),
-        *(
-            Method(
-                config,
-                _matcher(model, epochs) if config == "ljn" else _features(model, config, epochs),
-                refines=False,
-            )
-            for config in configs
-        ),
+        *(Method(config, ways[config], refines=False) for config in configs),
     ]
 
 
@@ -126,6 +123,22 @@ def _matcher(
         def find(_: None) -> Map:
             matcher = Matcher(source, target, model=model, epochs=epochs)
             return matcher.run(callback=_interruptible).point_map
+
+        return find
+
+    return bind
+
+
+def _unaided(
+    model: MatchModel, epochs: int
+) -> Callable[[PreparedMesh, PreparedMesh], Callable[[None], Map]]:
+    def bind(source: PreparedMesh, target: PreparedMesh) -> Callable[[None], Map]:
+        refiner = Refiner(source, target, model=None)
+
+        def find(_: None) -> Map:
+            matcher = Matcher(source, target, model=model, epochs=epochs)
+            initial = matcher.run(callback=_interruptible).initial
+            return refiner.refine(initial.point_map).point_map
 
         return find
 

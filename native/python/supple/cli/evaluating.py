@@ -65,8 +65,8 @@ def evaluate_match(
     ] = None,
     model: Annotated[str, typer.Option(help="Shipped features or .safetensors file.")] = "features",
     configs: Annotated[
-        str, typer.Option(help="Losses to adapt by, with commas: ljn, without_ljn, ulrssm, cdfm.")
-    ] = "without_ljn,ljn",
+        str, typer.Option(help="Ways, with commas: ljn, no_network, without_ljn, ulrssm, cdfm.")
+    ] = "without_ljn,no_network,ljn",
     epochs: Annotated[int, typer.Option(min=0, help="Of adaptation to each pair.")] = EPOCHS,
     pairs: Annotated[int | None, typer.Option(min=1, help="Only the first so many pairs.")] = None,
     cache: Annotated[bool, typer.Option(help="Keep prepared meshes on disk, and use them.")] = True,
