@@ -172,6 +172,7 @@ void bind_matching(py::module_& module) {
       .def(py::init<>())
       .def_readwrite("training", &MatchOptions::training)
       .def_readwrite("functions", &MatchOptions::functions)
+      .def_readwrite("most_pairs", &MatchOptions::most_pairs)
       .def_readwrite("automatic", &MatchOptions::automatic)
       .def_readwrite("refine", &MatchOptions::refine);
 

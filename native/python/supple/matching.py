@@ -67,7 +67,8 @@ class MatchResult:
         initial: InitialMap: the map that was refined, with its plausibility and notes.
         automatic: it came from automatic_map, which was more plausible than what the features gave.
         history: Epoch of each epoch of adaptation to the pair.
-        notes: where the two meshes differ in what a map can't respect.
+        notes: where the two meshes differ in what a map can't respect; "not_adapted" where they are
+            too large for it.
     """
 
     refined: RefineResult

@@ -86,6 +86,23 @@ TEST_F(Matching, GoesOnAfterACancelledRunAndRepeatsItself) {
             whole.networks().features.parameters.tensors());
 }
 
+TEST_F(Matching, LargeMeshesAreMatchedBySamplesWithoutAdaptation) {
+  options.training.epochs = 0;
+  const Prepared a = prepared(mesh), b = prepared(copy);
+  const Eigen::VectorXi whole = Matcher(a, b, networks(), options).features_map().point_map;
+  options.training.epochs = 2;
+  options.most_pairs = 1000.0;
+  Matcher large(a, b, networks(), options);
+  ASSERT_EQ(large.notes().size(), 1u);
+  EXPECT_EQ(large.notes()[0].code, "not_adapted");
+  EXPECT_EQ(large.notes()[0].count, 642);
+  large.adapt();
+  EXPECT_TRUE(large.history().empty());
+  // There are fewer vertices than samples, so all of them are compared.
+  const Eigen::VectorXi sampled = large.features_map().point_map;
+  EXPECT_GT(static_cast<double>((sampled.array() == whole.array()).count()), 0.99 * 642);
+}
+
 TEST_F(Matching, GuidesLeadThereAndBackSlow) {
   const Prepared a = prepared(mesh), b = prepared(copy);
   const GuideMaps guides = guide_maps(*a, *b, 20);

@@ -42,6 +42,9 @@ struct MatchOptions {
   /// Adaptation to the pair: 2 steps an epoch, without guides. 0 epochs: the features as they are.
   JointTrainOptions training;
   int functions = 80;  ///< of functional maps and the signal, >= 1
+  /// Meshes of more pairs of vertices than this are not adapted to (a step would take longer than
+  /// some ten seconds), and their soft map is taken between 3,000 and 6,000 samples.
+  double most_pairs = 1.5e8;
   /// Also look for a map without features (`automatic_map`); the more plausible one is refined.
   bool automatic = true;
   RefineOptions refine;
@@ -83,7 +86,7 @@ class Matcher {
   /// What the features say now: the point map of the functional map of their soft map. The paper,
   /// Eqns 12 and 6.
   InitialMap features_map(ProgressRange progress = {}) const;
-  /// Those of the refiner.
+  /// Those of the refiner; "not_adapted" where the meshes are too large for it.
   const std::vector<Note>& notes() const;
 
  private:

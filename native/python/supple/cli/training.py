@@ -31,13 +31,13 @@ def train_unsupervised(
     config: Annotated[Config, typer.Option(help="The loss.")] = Config.ljn,
     start: Annotated[
         str, typer.Option(help="Shipped features or .safetensors file to start from, or none.")
-    ] = "none",
+    ] = "features",
     guided_epochs: Annotated[
         int | None,
         typer.Option(
             min=0,
             help="Epochs at the start that are drawn to rough maps, found by the shapes alone.",
-            show_default="5, or 0 with --start",
+            show_default="5 with --start none, or else 0",
         ),
     ] = None,
     guide_pairs: Annotated[int, typer.Option(min=1, help="Rough maps to look for, a mesh.")] = 3,

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <optional>
+#include <string>
 #include <utility>
 
+#include "supple/core/dense.h"
 #include "supple/core/error.h"
+#include "supple/learning/soft_map.h"
 #include "supple/spectral/map_fit.h"
+#include "supple/spectral/sampling.h"
 #include "supple/tasks/match.h"
 #include "tasks/initial_map/candidates.h"
 
@@ -12,6 +16,7 @@ namespace supple {
 namespace {
 
 constexpr Eigen::Index kFew = 20, kStep = 4;  // functions that ZoomOut starts from, and its steps
+constexpr Eigen::Index kSourceSamples = 3000, kTargetSamples = 6000;
 
 const PreparedMesh& checked(const std::shared_ptr<const PreparedMesh>& mesh, const char* which) {
   if (mesh == nullptr) {
@@ -38,17 +43,26 @@ struct Matcher::Impl {
         surfaces{joint_surface(checked(source, "source"), networks_in, options.functions),
                  joint_surface(checked(target, "target"), networks_in, options.functions)},
         networks(networks_in),
-        refiner(source, target, nullptr, options.refine, progress) {
+        refiner(source, target, nullptr, options.refine, progress),
+        notes(refiner.notes()) {
     if (options.training.epochs < 0) {
       throw Error(ErrorCode::bad_option, "A match takes 0 epochs of adaptation or more.");
     }
-    if (options.training.epochs > 0) {
+    const Eigen::Index n1 = source->basis.mass.size(), n2 = target->basis.mass.size();
+    large = static_cast<double>(n1) * static_cast<double>(n2) > options.most_pairs;
+    if (large && options.training.epochs > 0) {
+      notes.push_back({"not_adapted", static_cast<int>(std::max(n1, n2)),
+                       "The meshes have " + std::to_string(n1) + " and " + std::to_string(n2) +
+                           " vertices, too many to adapt the features to them; they are used as "
+                           "they are. Coarser copies of the meshes can be adapted to."});
+    }
+    if (!large && options.training.epochs > 0) {
       trainer.emplace(std::vector{surfaces[0], surfaces[1]}, std::vector{0, 0},
                       std::vector<GuidePair>{}, networks_in, options.training);
     }
   }
 
-  // C' of the features, source to target.
+  // C' of the features, source to target; of large meshes from samples.
   RowMatrix<double> functional_map(const ProgressRange& progress) const;
   // From its first few functions on by ZoomOut: features that lead roughly to the right place are
   // enough.
@@ -61,6 +75,8 @@ struct Matcher::Impl {
   MatchNetworks networks;  // as given
   std::optional<JointTrainer> trainer;
   Refiner refiner;  // for its notes and checks before the long work; refining takes the adapted one
+  std::vector<Note> notes;
+  bool large = false;  // too large for a soft map of every vertex
 };
 
 Matcher::Matcher(std::shared_ptr<const PreparedMesh> source,
@@ -83,9 +99,23 @@ RowMatrix<double> Matcher::Impl::functional_map(const ProgressRange& progress) c
   for (size_t d = 0; d < 2; ++d) {
     features[d] = now().features.features(surfaces[d]->features);
   }
-  return match<float>({&surfaces[0]->match, &surfaces[1]->match}, features, options.training.loss,
-                      progress)[0]
-      .soft_map;
+  const MatchSurface &from = surfaces[0]->match, &to = surfaces[1]->match;
+  if (!large) {
+    return match<float>({&from, &to}, features, options.training.loss, progress)[0].soft_map;
+  }
+  const Points& points = source->operators.vertices;
+  const Eigen::VectorXi rows = farthest_point_samples(points, kSourceSamples);
+  const Eigen::VectorXi columns =
+      farthest_point_samples(target->operators.vertices, kTargetSamples);
+  const SoftMapPair<float> soft(features[0](rows, Eigen::all), features[1](columns, Eigen::all),
+                                options.training.loss.temperature,
+                                progress.stage("soft map", 0.0, 0.3));
+  const RowMatrix<float> functions = to.functions(columns, Eigen::all).cast<float>();
+  const RowMatrix<double> pulled =
+      soft.apply({RowMatrix<float>(), functions}, progress.stage("soft map", 0.3, 1.0))[0]
+          .values.cast<double>();
+  return product(sampled_domain<double>(source->basis, from.values.size(), points, rows).projector,
+                 pulled);
 }
 
 InitialMap Matcher::Impl::upsampled(const RowMatrix<double>& map,
@@ -142,6 +172,6 @@ MatchResult Matcher::run(ProgressRange progress, const Watch& watch) {
   return result;
 }
 
-const std::vector<Note>& Matcher::notes() const { return impl_->refiner.notes(); }
+const std::vector<Note>& Matcher::notes() const { return impl_->notes; }
 
 }  // namespace supple
