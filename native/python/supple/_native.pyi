@@ -372,6 +372,7 @@ class SoftMap:
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
 
 class UnsupervisedOptions:
+    smooth_features: bool
     def __init__(self) -> None: ...
     @property
     def temperature(self) -> float: ...
@@ -1159,6 +1160,7 @@ def guide_maps(
 class JointTrainOptions:
     loss: UnsupervisedOptions
     epochs: int
+    first_temperature: float
     guided_epochs: int
     guide_weight: float
     feature_learning_rate: collections.abc.Sequence[float]
@@ -1222,6 +1224,7 @@ class JointTrainer:
 class MatchOptions:
     training: JointTrainOptions
     functions: int
+    most_pairs: float
     automatic: bool
     refine: RefineOptions
     def __init__(self) -> None: ...
