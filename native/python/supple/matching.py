@@ -98,7 +98,8 @@ class Matcher:
             without the deformation's part; "ulrssm" (Cao et al. 2023) or "cdfm" (Sun et al. 2023).
             All but "ljn" also refine without the network.
         epochs: of adaptation to the pair, two steps each; 0 for the features as they are.
-        automatic: also look for a map without features, and take the more plausible one.
+        automatic: also look for a map without features; where it is more plausible it guides the
+            adaptation, and the more plausible one in the end is refined.
         seed: of the order of steps.
         progress: a Progress to watch and cancel.
 

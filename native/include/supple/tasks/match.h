@@ -39,20 +39,22 @@ GuideMaps guide_maps(const PreparedMesh& first, const PreparedMesh& second, int 
                      ProgressRange progress = {});
 
 struct MatchOptions {
-  /// Adaptation to the pair: 2 steps an epoch, without guides. 0 epochs: the features as they are.
+  /// Adaptation to the pair: 2 steps an epoch; 0 epochs: the features as they are. Where
+  /// `automatic_map` finds a more plausible map than the features give, it is the guide of the
+  /// first two thirds, whatever `guided_epochs` says.
   JointTrainOptions training;
   int functions = 80;  ///< of functional maps and the signal, >= 1
   /// Meshes of more pairs of vertices than this are not adapted to (a step would take longer than
   /// some ten seconds), and their soft map is taken between 3,000 and 6,000 samples.
   double most_pairs = 1.5e8;
-  /// Also look for a map without features (`automatic_map`); the more plausible one is refined.
+  /// Also look for a map without features (`automatic_map`); the more plausible one guides the
+  /// adaptation and, after it, is refined.
   bool automatic = true;
   RefineOptions refine;
 
   MatchOptions() {
     training.epochs = 15;
-    training.guided_epochs = 0;
-    training.feature_learning_rate = {3e-4, 1e-4};
+    training.feature_learning_rate = {1e-3, 1e-4};
   }
 };
 

@@ -7,10 +7,12 @@
 #include "supple/core/dense.h"
 #include "supple/core/error.h"
 #include "supple/learning/soft_map.h"
+#include "supple/spectral/functional_map.h"
 #include "supple/spectral/map_fit.h"
 #include "supple/spectral/sampling.h"
 #include "supple/tasks/match.h"
 #include "tasks/initial_map/candidates.h"
+#include "tasks/refine/pair.h"
 
 namespace supple {
 namespace {
@@ -56,11 +58,21 @@ struct Matcher::Impl {
                            " vertices, too many to adapt the features to them; they are used as "
                            "they are. Coarser copies of the meshes can be adapted to."});
     }
-    if (!large && options.training.epochs > 0) {
-      trainer.emplace(std::vector{surfaces[0], surfaces[1]}, std::vector{0, 0},
-                      std::vector<GuidePair>{}, networks_in, options.training);
+    if (adapts()) {  // to say what is wrong before the long work
+      start({});
     }
   }
+
+  bool adapts() const { return !large && options.training.epochs > 0; }
+  void start(std::vector<GuidePair> guides) {
+    options.training.guided_epochs = (2 * options.training.epochs + 2) / 3;
+    trainer.emplace(std::vector{surfaces[0], surfaces[1]}, std::vector{0, 0}, std::move(guides),
+                    networks, options.training);
+  }
+  // The map without features, found once.
+  const InitialMap& without_features(const ProgressRange& progress);
+  // That map both ways, as the trainer wants it.
+  GuidePair guide() const;
 
   // C' of the features, source to target; of large meshes from samples.
   RowMatrix<double> functional_map(const ProgressRange& progress) const;
@@ -76,6 +88,7 @@ struct Matcher::Impl {
   std::optional<JointTrainer> trainer;
   Refiner refiner;  // for its notes and checks before the long work; refining takes the adapted one
   std::vector<Note> notes;
+  std::optional<InitialMap> automatic;
   bool large = false;  // too large for a soft map of every vertex
 };
 
@@ -135,7 +148,33 @@ InitialMap Matcher::features_map(ProgressRange progress) const {
       .finished(map, progress.stage("finding vertices", 0.8, 1.0));
 }
 
+const InitialMap& Matcher::Impl::without_features(const ProgressRange& progress) {
+  if (!automatic.has_value()) {
+    automatic = automatic_map(*source, *target, progress);
+  }
+  return *automatic;
+}
+
+GuidePair Matcher::Impl::guide() const {
+  const Eigen::VectorXi there = refining::to_surfaces(
+      source->mesh, target->mesh, refining::surface_anchor(target->mesh), automatic->point_map);
+  const Eigen::Index k1 = surfaces[0]->match.values.size(), k2 = surfaces[1]->match.values.size();
+  const RowMatrix<double> map = supple::functional_map(source->basis, target->basis, there, k1, k2);
+  // Maps of equal areas are orthogonal, so the way back is the transpose.
+  return {0, 1, {map, RowMatrix<double>(map.transpose())}};
+}
+
 void Matcher::adapt(ProgressRange progress, const Watch& watch) {
+  if (impl_->adapts() && impl_->options.automatic && history().empty()) {
+    const ProgressRange looking = progress.stage("looking for a first map", 0.0, 0.1);
+    const InitialMap features = features_map(looking.stage("comparing features", 0.0, 0.3));
+    const InitialMap& other =
+        impl_->without_features(looking.stage("looking for a first map", 0.3, 1.0));
+    if (other.score.value() > features.score.value()) {
+      impl_->start({impl_->guide()});
+    }
+    progress = progress.stage("adapting to the pair", 0.1, 1.0);
+  }
   const double epochs = impl_->options.training.epochs;
   while (impl_->trainer.has_value() && !impl_->trainer->finished()) {
     const auto done = static_cast<double>(history().size());
@@ -162,9 +201,7 @@ MatchResult Matcher::run(ProgressRange progress, const Watch& watch) {
   };
   consider(impl_->upsampled(map, progress.stage("upsampling", 0.86, 0.88)), false);
   if (impl_->options.automatic) {
-    consider(automatic_map(*impl_->source, *impl_->target,
-                           progress.stage("looking for other maps", 0.88, 0.96)),
-             true);
+    consider(impl_->without_features(progress.stage("looking for other maps", 0.88, 0.96)), true);
   }
   const Refiner refiner(impl_->source, impl_->target, refining_network(impl_->now()),
                         impl_->options.refine);
