@@ -86,6 +86,23 @@ TEST_F(Matching, GoesOnAfterACancelledRunAndRepeatsItself) {
             whole.networks().features.parameters.tensors());
 }
 
+TEST_F(Matching, AMorePlausibleMapGuidesTheAdaptationSlow) {
+  options.automatic = true;
+  options.training.epochs = 30;
+  options.training.feature_learning_rate = {1e-2, 1e-2};
+  Matcher matcher(prepared(mesh), prepared(copy), networks(), options);
+  matcher.adapt();
+  EXPECT_EQ(matcher.history()[0].guide_share, 1.0);
+  EXPECT_GT(matcher.history()[19].guide_share, 0.0);
+  EXPECT_EQ(matcher.history()[20].guide_share, 0.0);
+  EXPECT_LT(matcher.history()[19].loss.guide, matcher.history()[0].loss.guide);
+  options.automatic = false;
+  options.training.epochs = 1;
+  Matcher alone(prepared(mesh), prepared(copy), networks(), options);
+  alone.adapt();
+  EXPECT_EQ(alone.history()[0].guide_share, 0.0);
+}
+
 TEST_F(Matching, LargeMeshesAreMatchedBySamplesWithoutAdaptation) {
   options.training.epochs = 0;
   const Prepared a = prepared(mesh), b = prepared(copy);
