@@ -51,13 +51,29 @@ def test_a_posed_and_moved_copy_is_found(pair, model):
     assert np.abs(colours[1] - colours[0][pair[2]]).mean() < 0.05
 
 
-def test_features_are_a_start_and_need_no_refining(addon, small_pair, model):
+def test_features_are_a_start_and_need_no_refining(small_pair, model):
     body, scan, _ = small_pair
     pairs.choose(body, scan, "FEATURES", model=model, epochs=0, refine=False)
     assert bpy.ops.supple.match() == {"FINISHED"}
-    assert addon("match").WITHOUT_FEATURES in scan.supple_map.notes  # none were learned
     assert pairs.error(small_pair) < 1e-3
     assert set(pairs.attribute(scan, "Supple Confidence")) == {np.float32(1)}
+
+
+def test_it_is_said_when_the_features_were_not_what_was_taken(
+    addon, small_pair, model, monkeypatch
+):
+    body, scan, _ = small_pair
+    features = addon("match_features")
+    found = features.match
+
+    def without(*arguments):
+        result = found(*arguments)
+        result.automatic = True
+        return result
+
+    monkeypatch.setattr(features, "match", without)
+    assert learned.find(body, scan, model, epochs=0) == {"FINISHED"}
+    assert addon("match").WITHOUT_FEATURES in scan.supple_map.notes
 
 
 def test_adapting_is_what_finds_the_partners(addon, supple, small_pair, tmp_path):

@@ -27,7 +27,7 @@ def match(model, epochs, source, target, stages):
     learning.begin(epochs)
 
     def after(epoch):
-        learning.losses.append(epoch.loss["total"])
+        learning.losses.append(epoch.minimised)
         if learning.is_previewed and epoch.epoch % EPOCHS_A_PREVIEW == 0:
             learning.point_map = matcher.features_map().point_map
 

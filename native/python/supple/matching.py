@@ -51,6 +51,11 @@ class Epoch:
     guide: float = 0.0
     guide_share: float = 0.0
 
+    @property
+    def minimised(self) -> float:
+        """The guide's share and what is left to the loss: what a curve should show."""
+        return self.loss["total"] + self.guide_share * self.guide
+
 
 def epoch_of(native: _native.JointEpoch) -> Epoch:
     terms = dict(zip(TERMS, native.terms, strict=True))
