@@ -14,6 +14,14 @@ ProgressRange part_of(Progress* progress, const char* name, const std::array<dou
   return range(progress).stage(name, part[0], part[1]);
 }
 
+MatchNetworks with_network(FeatureNetwork<float> features, const Network* network) {
+  MatchNetworks result{std::move(features), {}};
+  if (network != nullptr) {
+    result.jacobians = *network;
+  }
+  return result;
+}
+
 // A trainer and the meshes that its surfaces look into.
 struct MeshTrainer {
   MeshTrainer(Meshes meshes_in, std::vector<int> groups, std::vector<GuidePair> guides,
@@ -53,12 +61,8 @@ void bind_matching(py::module_& module) {
       .def(py::init([](const std::string& input, const DiffusionSizes& sizes, int eigenfunctions,
                        const Tensors& tensors, const Network* network) {
              const FeatureArchitecture architecture{feature_input(input), sizes, eigenfunctions};
-             MatchNetworks result{
-                 {architecture, DiffusionParameters<float>::from_tensors(sizes, tensors)}, {}};
-             if (network != nullptr) {
-               result.jacobians = *network;
-             }
-             return result;
+             return with_network(
+                 {architecture, DiffusionParameters<float>::from_tensors(sizes, tensors)}, network);
            }),
            py::arg("input"), py::arg("sizes"), py::arg("eigenfunctions"), py::arg("tensors"),
            py::arg("network"))
@@ -66,13 +70,9 @@ void bind_matching(py::module_& module) {
           "untrained",
           [](const std::string& input, const DiffusionSizes& sizes, int eigenfunctions,
              uint64_t seed, const Network* network) {
-            MatchNetworks result{
+            return with_network(
                 FeatureNetwork<float>::random({feature_input(input), sizes, eigenfunctions}, seed),
-                {}};
-            if (network != nullptr) {
-              result.jacobians = *network;
-            }
-            return result;
+                network);
           },
           py::arg("input"), py::arg("sizes"), py::arg("eigenfunctions"), py::arg("seed"),
           py::arg("network"))

@@ -6,6 +6,7 @@
 #include <random>
 #include <utility>
 
+#include "draws.h"
 #include "supple/core/error.h"
 #include "tensors.h"
 
@@ -17,18 +18,6 @@ using AdamState = Adam<float>::State;
 
 constexpr const char* kFeatures = "features.";
 constexpr const char* kJacobians = "jacobians.";
-
-// Uniform in [0, count); the library's distributions differ between implementations.
-int draw(std::mt19937_64& generator, int count) {
-  return static_cast<int>(generator() % static_cast<uint64_t>(count));
-}
-
-template <class Item>
-void shuffle(std::mt19937_64& generator, std::vector<Item>& items) {
-  for (int i = static_cast<int>(items.size()) - 1; i > 0; --i) {
-    std::swap(items[static_cast<size_t>(i)], items[static_cast<size_t>(draw(generator, i + 1))]);
-  }
-}
 
 void check(const JointTrainOptions& options) {
   const auto rates = {options.feature_learning_rate, options.jacobian_learning_rate};

@@ -5,15 +5,11 @@
 #include <numeric>
 #include <string>
 
+#include "draws.h"
 #include "supple/core/error.h"
 
 namespace supple {
 namespace {
-
-// Uniform in [0, count); the library's distributions differ between implementations.
-int draw(std::mt19937_64& generator, int count) {
-  return static_cast<int>(generator() % static_cast<uint64_t>(count));
-}
 
 void check(const TrainOptions& options, size_t pairs) {
   if (pairs == 0) {
@@ -249,9 +245,7 @@ template <class Scalar>
 TrainStep Trainer<Scalar>::step() {
   const int count = static_cast<int>(examples_.size());
   if (next_ % count == 0) {
-    for (int i = count - 1; i > 0; --i) {
-      std::swap(order_[i], order_[draw(generator_, i + 1)]);
-    }
+    shuffle(generator_, order_);
   }
   TrainStep result;
   result.step = next_;
