@@ -159,6 +159,26 @@ def test_flips_are_counted_where_their_truth_is_known(folder, pair):
     assert made["pairs"] == 2
 
 
+def test_what_rows_share_is_done_once_a_pair_and_counts_for_each(folder):
+    match_set = read_match_set(folder, refine=False)
+    begun = []
+
+    def begin(source, target):
+        begun.append((source, target))
+        time.sleep(0.02)
+        return match_set.shapes["b"].template
+
+    chosen = [
+        evaluation.Method(name, lambda s, t, found: lambda _: found, refines=False, shared=begin)
+        for name in ("one", "other")
+    ]
+    made = evaluation.Evaluation(match_set, chosen, cache=False).run()
+    assert len(begun) == 1
+    for row in made["rows"].values():
+        assert row["geodesic"] == 0
+        assert row[evaluation.SECONDS] >= 0.02
+
+
 def test_unknown_losses_are_named(folder):
     model = ["--model", folder / "features.safetensors"]
     result = run("evaluate", "match", folder, *model, "--configs", "ljn,magic")

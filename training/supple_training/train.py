@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import json
 import os
-import threading
 import time
 from enum import StrEnum
 from pathlib import Path
@@ -21,8 +20,8 @@ import matplotlib
 import numpy as np
 import supple
 import typer
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from supple.cli.console import watched
 
 from supple_training import pairs as pair_store
 from supple_training.console import DEFAULT_CACHE, console, pairs_with_progress, progress_bar
@@ -98,57 +97,30 @@ def with_maps(pairs: list[pair_store.Pair], seed: int) -> list[tuple]:
     ]
 
 
+class LatestStep:
+    """A callback for training; as text, how it stands."""
+
+    def __init__(self, total: int) -> None:
+        self._total = total
+        self._text = ""
+
+    def __call__(self, step: dict) -> None:
+        self._text = f"step {step['step'] + 1}/{self._total}, loss {step['loss']:.4f}"
+
+    def __str__(self) -> str:
+        return self._text
+
+
 def run_training(pairs: list[tuple], **options) -> tuple[supple.TrainResult, float]:
-    """`supple.train` under a progress bar; returns its result and the seconds it took.
-
-    Ctrl-C cancels the native run and raises KeyboardInterrupt.
-    """
-    watched = supple.Progress()
-    outcome: dict = {}
-
-    def note(step: dict) -> None:
-        outcome["step"] = step
-
-    def work() -> None:
-        try:
-            outcome["result"] = supple.train(pairs, progress=watched, callback=note, **options)
-        except BaseException as error:  # handed to the main thread, which raises it
-            outcome["error"] = error
-
-    total = options["epochs"] * len(pairs)
+    """`supple.train` under a progress bar; returns its result and the seconds it took."""
+    latest = LatestStep(options["epochs"] * len(pairs))
     start = time.perf_counter()
-    worker = threading.Thread(target=work)
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f}%"),
-        TimeElapsedColumn(),
-        TextColumn("{task.fields[left]}"),
-        TextColumn("{task.fields[loss]}"),
-        console=console,
-    ) as bar:
-        task = bar.add_task("starting", total=1.0, left="", loss="")
-        worker.start()
-        try:
-            while worker.is_alive():
-                worker.join(0.2)
-                left, step = watched.seconds_left, outcome.get("step")
-                bar.update(
-                    task,
-                    description=watched.stage or "starting",
-                    completed=watched.fraction,
-                    left="" if left is None else f"{left:.0f} s left",
-                    loss=""
-                    if step is None
-                    else f"step {step['step'] + 1}/{total} loss {step['loss']:.4f}",
-                )
-        except KeyboardInterrupt:
-            watched.cancel()
-            worker.join()
-            raise
-    if "error" in outcome:
-        raise outcome["error"]
-    return outcome["result"], time.perf_counter() - start
+    result = watched(
+        "training",
+        lambda progress: supple.train(pairs, progress=progress, callback=latest, **options),
+        latest,
+    )
+    return result, time.perf_counter() - start
 
 
 def epoch_means(steps: list[dict], pairs: int) -> dict[str, list[float]]:
@@ -249,7 +221,6 @@ def main(
         metadata=metadata,
     )
     result.model.save(out)
-    out.chmod(0o644)  # safetensors leaves it to its owner alone
     steps = len(result.steps)
     cores = len(os.sched_getaffinity(0))
     console.print(

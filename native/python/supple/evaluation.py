@@ -12,7 +12,7 @@ from . import _native, map_metrics
 from .initial_maps import automatic_map, zoomout_map
 from .match_model import MatchModel
 from .match_sets import MatchSet, MatchShape
-from .matching import EPOCHS, Epoch, Matcher, configure
+from .matching import EPOCHS, Epoch, Matcher, MatchResult, configure
 from .mesh import PreparedMesh
 from .model import Model
 from .refining import Refiner
@@ -37,11 +37,14 @@ class Method:
             none. Only the latter's time is "seconds_per_pair": meshes are prepared, and what bind
             does is done.
         refines: whether it needs a map to start from.
+        shared: what several rows of a pair begin with: done once, its time counted to each, and its
+            result given to bind as the third argument.
     """
 
     name: str
-    bind: Callable[[PreparedMesh, PreparedMesh], Callable[[Map | None], Map]]
+    bind: Callable[..., Callable[[Map | None], Map]]
     refines: bool = True
+    shared: Callable[[PreparedMesh, PreparedMesh], object] | None = None
 
 
 def _refiner(**options: object) -> Callable[[PreparedMesh, PreparedMesh], Callable[[Map], Map]]:
@@ -86,15 +89,19 @@ def match_methods(
     Raises:
         SuppleError: bad_option.
     """
-    ways = {NO_NETWORK: _unaided(model, epochs), "ljn": _matcher(model, epochs)}
+    found = _matches(model, epochs)
+    rows = {
+        NO_NETWORK: Method(NO_NETWORK, _unaided, refines=False, shared=found),
+        "ljn": Method("ljn", _refined, refines=False, shared=found),
+    }
     for config in configs:
-        if config not in ways:
+        if config not in rows:
             configure(_native.JointTrainOptions(), config)
-            ways[config] = _features(model, config, epochs)
+            rows[config] = Method(config, _features(model, config, epochs), refines=False)
     return [
         Method("automatic", _automatic, refines=False),
         Method("features", _features(model, "ljn", 0), refines=False),
-        *(Method(config, ways[config], refines=False) for config in configs),
+        *(rows[config] for config in configs),
     ]
 
 
@@ -116,37 +123,35 @@ def _features(
     return bind
 
 
-def _matcher(
-    model: MatchModel, epochs: int
-) -> Callable[[PreparedMesh, PreparedMesh], Callable[[None], Map]]:
-    def bind(source: PreparedMesh, target: PreparedMesh) -> Callable[[None], Map]:
-        def find(_: None) -> Map:
-            matcher = Matcher(source, target, model=model, epochs=epochs)
-            return matcher.run(callback=_interruptible).point_map
+def _matches(model: MatchModel, epochs: int) -> Callable[[PreparedMesh, PreparedMesh], MatchResult]:
+    def find(source: PreparedMesh, target: PreparedMesh) -> MatchResult:
+        return Matcher(source, target, model=model, epochs=epochs).run(callback=_interruptible)
 
-        return find
+    return find
 
-    return bind
+
+def _refined(
+    source: PreparedMesh, target: PreparedMesh, found: MatchResult
+) -> Callable[[None], Map]:
+    return lambda _: found.point_map
 
 
 def _unaided(
-    model: MatchModel, epochs: int
-) -> Callable[[PreparedMesh, PreparedMesh], Callable[[None], Map]]:
-    def bind(source: PreparedMesh, target: PreparedMesh) -> Callable[[None], Map]:
-        refiner = Refiner(source, target, model=None)
-
-        def find(_: None) -> Map:
-            matcher = Matcher(source, target, model=model, epochs=epochs)
-            initial = matcher.run(callback=_interruptible).initial
-            return refiner.refine(initial.point_map).point_map
-
-        return find
-
-    return bind
+    source: PreparedMesh, target: PreparedMesh, found: MatchResult
+) -> Callable[[None], Map]:
+    refiner = Refiner(source, target, model=None)
+    return lambda _: refiner.refine(found.initial.point_map).point_map
 
 
 def _interruptible(epoch: Epoch) -> None:
     """Back in Python after each epoch, where Ctrl+C takes effect."""
+
+
+def _timed(call: Callable, *arguments: object) -> tuple[object, float]:
+    """What a call returns, and its seconds."""
+    began = time.perf_counter()
+    result = call(*arguments)
+    return result, time.perf_counter() - began
 
 
 class Evaluation:
@@ -195,19 +200,22 @@ class Evaluation:
         start = self._set.initial[a, b] if self._refines else None
         if start is not None:
             maps[INITIAL], rows[INITIAL] = start, {SECONDS: 0.0, "bind_seconds": 0.0}
+        shared: dict[Callable, tuple[object, float]] = {}
         for method in self._chosen:
             self._step(f"{a} {b}: {method.name}")
-            began = time.perf_counter()
-            refine = method.bind(source, target)
-            bound = time.perf_counter() - began
+            given, before = [], 0.0
+            if method.shared is not None:
+                if method.shared not in shared:
+                    shared[method.shared] = _timed(method.shared, source, target)
+                given, before = [shared[method.shared][0]], shared[method.shared][1]
+            refine, bound = _timed(method.bind, source, target, *given)
             if method.refines and self._done <= len(self._chosen) + 2:
                 refine(start)  # the first call of all warms up
             seconds = []
             for _ in range(self._runs):
-                began = time.perf_counter()
-                maps[method.name] = refine(start)
-                seconds.append(time.perf_counter() - began)
-            rows[method.name] = {SECONDS: min(seconds), "bind_seconds": bound}
+                maps[method.name], once = _timed(refine, start)
+                seconds.append(once)
+            rows[method.name] = {SECONDS: before + min(seconds), "bind_seconds": bound}
         self._step(f"{a} {b}: measuring")
         self._measure(a, b, maps, rows)
         return rows

@@ -6,9 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <exception>
 #include <limits>
-#include <mutex>
 #include <string>
 
 #include "soft_weights.h"
@@ -192,38 +190,19 @@ template <class Scalar>
 template <class Step>
 void SoftMapPair<Scalar>::over_tiles(const ProgressRange& progress, const Step& step) const {
   const size_t rows = features_[0].size(), cols = features_[1].size(), count = parts();
-  std::exception_ptr failure;
-  std::mutex mutex;
-  std::atomic<bool> failed = false;
   std::atomic<size_t> done = 0;
-  const auto run = [&](size_t part) {
-    const SingleThread one;
+  run_at_once(count, [&](size_t part) {
     Tile tile;
     tile.part = part;
     for (tile.row = rows * part / count; tile.row < rows * (part + 1) / count; ++tile.row) {
-      for (tile.col = 0; tile.col < cols && !failed; ++tile.col) {
+      for (tile.col = 0; tile.col < cols; ++tile.col) {
         progress.report(static_cast<double>(done++) / static_cast<double>(rows * cols));
         gemm(Scalar(1), features_[0][tile.row], Op::none, features_[1][tile.col], Op::transpose,
              Scalar(0), tile.products);
         step(tile);
       }
     }
-  };
-#pragma omp parallel for schedule(static, 1) num_threads(static_cast <int>(count)) if (count > 1)
-  for (size_t part = 0; part < count; ++part) {
-    try {
-      run(part);
-    } catch (...) {
-      const std::lock_guard lock(mutex);
-      if (!failed) {
-        failure = std::current_exception();
-        failed = true;
-      }
-    }
-  }
-  if (failure) {
-    std::rethrow_exception(failure);
-  }
+  });
   progress.report(1.0);
 }
 

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <exception>
-#include <mutex>
 #include <string>
 
 #include "supple/core/error.h"
@@ -147,30 +145,12 @@ Points SequenceEditor::solve(const SequenceFrame& frame) const {
 std::vector<Points> SequenceEditor::solve(const std::vector<SequenceFrame>& frames,
                                           ProgressRange progress) const {
   std::vector<Points> results(frames.size());
-  std::exception_ptr failure;
-  std::mutex mutex;
-  std::atomic<bool> failed = false;
   std::atomic<int> done = 0;
-#pragma omp parallel for schedule(dynamic, 1)
-  for (size_t i = 0; i < frames.size(); ++i) {
-    if (failed) {
-      continue;
-    }
-    try {
-      progress.report(static_cast<double>(done) / static_cast<double>(frames.size()));
-      results[i] = solve(frames[i]);
-      ++done;
-    } catch (...) {
-      const std::lock_guard lock(mutex);
-      if (!failed) {
-        failure = std::current_exception();
-        failed = true;
-      }
-    }
-  }
-  if (failure) {
-    std::rethrow_exception(failure);
-  }
+  run_at_once(frames.size(), [&](size_t i) {
+    progress.report(static_cast<double>(done) / static_cast<double>(frames.size()));
+    results[i] = solve(frames[i]);
+    ++done;
+  });
   progress.report(1.0);
   return results;
 }

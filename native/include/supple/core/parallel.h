@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
+#include <functional>
+
 namespace supple {
 
 /// Threads that a call from this thread shares its work among, BLAS included. Starts as
@@ -20,5 +23,9 @@ class SingleThread {
  private:
   int before_;
 };
+
+/// Calls step(i) for each i below count, as many at a time as there are threads, each with one
+/// thread of its own. After a step has thrown no other begins, and the first exception is thrown on.
+void run_at_once(size_t count, const std::function<void(size_t)>& step);
 
 }  // namespace supple

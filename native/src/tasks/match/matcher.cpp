@@ -18,6 +18,8 @@ namespace supple {
 namespace {
 
 constexpr Eigen::Index kFew = 20, kStep = 4;  // functions that ZoomOut starts from, and its steps
+constexpr Eigen::Index kFinest = 120;         // and those it ends with for nearest features
+constexpr int kFineStep = 10;
 constexpr Eigen::Index kSourceSamples = 3000, kTargetSamples = 6000;
 
 const PreparedMesh& checked(const std::shared_ptr<const PreparedMesh>& mesh, const char* which) {
@@ -74,8 +76,12 @@ struct Matcher::Impl {
   // That map both ways, as the trainer wants it.
   GuidePair guide() const;
 
+  FeaturePair<float> features() const;  // of both surfaces, as adapted so far
   // C' of the features, source to target; of large meshes from samples.
   RowMatrix<double> functional_map(const ProgressRange& progress) const;
+  // What the features say: the vertices with the nearest features, which tell apart more than a
+  // functional map can hold, made smooth by ZoomOut. Of large meshes the point map of `map`, C'.
+  InitialMap of_features(const RowMatrix<double>& map, const ProgressRange& progress) const;
   // From its first few functions on by ZoomOut: features that lead roughly to the right place are
   // enough.
   InitialMap upsampled(const RowMatrix<double>& map, const ProgressRange& progress) const;
@@ -107,11 +113,16 @@ const std::vector<JointEpoch>& Matcher::history() const {
 
 const MatchNetworks& Matcher::networks() const { return impl_->now(); }
 
-RowMatrix<double> Matcher::Impl::functional_map(const ProgressRange& progress) const {
+FeaturePair<float> Matcher::Impl::features() const {
   FeaturePair<float> features;
   for (size_t d = 0; d < 2; ++d) {
     features[d] = now().features.features(surfaces[d]->features);
   }
+  return features;
+}
+
+RowMatrix<double> Matcher::Impl::functional_map(const ProgressRange& progress) const {
+  const FeaturePair<float> features = this->features();
   const MatchSurface &from = surfaces[0]->match, &to = surfaces[1]->match;
   if (!large) {
     return match<float>({&from, &to}, features, options.training.loss, progress)[0].soft_map;
@@ -129,6 +140,24 @@ RowMatrix<double> Matcher::Impl::functional_map(const ProgressRange& progress) c
           .values.cast<double>();
   return product(sampled_domain<double>(source->basis, from.values.size(), points, rows).projector,
                  pulled);
+}
+
+InitialMap Matcher::Impl::of_features(const RowMatrix<double>& map,
+                                      const ProgressRange& progress) const {
+  const initial_maps::MeshPair pair(*source, *target);
+  if (large) {
+    return pair.finished(map, progress);
+  }
+  const FeaturePair<float> features = this->features();
+  const SoftMapPair<float> soft(features[0], features[1], options.training.loss.temperature);
+  ZoomoutOptions rounds;
+  rounds.to = static_cast<int>(std::min({kFinest, source->basis.size(), target->basis.size()}));
+  rounds.from = static_cast<int>(std::min({map.rows(), map.cols(), Eigen::Index(rounds.to)}));
+  rounds.step = kFineStep;
+  const Zoomout found = zoomout(source->basis, target->basis,
+                                soft.hard_map(0, progress.stage("comparing features", 0.0, 0.3)),
+                                rounds, progress.stage("upsampling", 0.3, 1.0));
+  return pair.finished(found.point_map);
 }
 
 InitialMap Matcher::Impl::upsampled(const RowMatrix<double>& map,
@@ -191,8 +220,7 @@ MatchResult Matcher::run(ProgressRange progress, const Watch& watch) {
   const RowMatrix<double> map =
       impl_->functional_map(progress.stage("comparing features", 0.8, 0.84));
   MatchResult result;
-  result.initial = initial_maps::MeshPair(*impl_->source, *impl_->target)
-                       .finished(map, progress.stage("finding vertices", 0.84, 0.86));
+  result.initial = impl_->of_features(map, progress.stage("finding vertices", 0.84, 0.86));
   const auto consider = [&](InitialMap other, bool automatic) {
     if (other.score.value() > result.initial.score.value()) {
       result.initial = std::move(other);
