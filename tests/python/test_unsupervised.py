@@ -366,3 +366,10 @@ def test_the_command_writes_network_history_and_curve(blob, tmp_path):
         assert result.exit_code == 1
         assert part in " ".join(result.output.split())
     assert run("--config", "magic").exit_code == 2
+    # What a network was trained on before stays said.
+    other = tmp_path / "other.safetensors"
+    assert run("--start", out, "--out", other, "--about", "training_data=c").exit_code == 0
+    metadata = supple.load_match_model(other).metadata
+    assert metadata["training_data"] == "a=b; then c"
+    once = "unsupervised, without_ljn, 2 epochs"
+    assert metadata["training"] == f"{once}; then {once}"

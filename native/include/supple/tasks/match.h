@@ -50,9 +50,11 @@ struct MatchOptions {
   /// Also look for a map without features (`automatic_map`); the more plausible one guides the
   /// adaptation and, after it, is refined.
   bool automatic = true;
+  /// More rounds than by default: the maps found here have drifted farther.
   RefineOptions refine;
 
   MatchOptions() {
+    refine.counts.resize(20, refine.counts.back());
     training.epochs = 15;
     training.feature_learning_rate = {1e-3, 1e-4};
   }

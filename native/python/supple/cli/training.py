@@ -83,6 +83,9 @@ def train_unsupervised(
             "version": supple.__version__,
             **_entries(about or []),
         }
+        model = None if start == "none" else supple.load_match_model(start)
+        if model is not None:
+            metadata = _continued(model.metadata, metadata)
         shapes = read_shapes(folder, seed=seed)
         meshes = _prepared(shapes, cache=cache)
         began = time.perf_counter()
@@ -92,7 +95,7 @@ def train_unsupervised(
             lambda p: supple.train_unsupervised(
                 meshes,
                 [shape.group for shape in shapes],
-                model=None if start == "none" else start,
+                model=model,
                 config=config.value,
                 epochs=epochs,
                 guided_epochs=guided_epochs,
@@ -129,6 +132,17 @@ def train_unsupervised(
         f"wrote {out}, {metrics.name} and {curve.name}: {len(shapes)} meshes, "
         f"{len(result.history)} epochs, loss {result.history[-1].loss['total']:.4g}"
     )
+
+
+def _continued(before: dict[str, str], metadata: dict[str, str]) -> dict[str, str]:
+    """The metadata of a training that started from a model: what that was trained on and how stays
+    said, before what came then."""
+    both = {
+        name: f"{before[name]}; then {metadata[name]}"
+        for name in ("training", "training_data")
+        if name in before and name in metadata
+    }
+    return {**metadata, **both}
 
 
 def _entries(about: list[str]) -> dict[str, str]:
