@@ -25,7 +25,8 @@ class SingleThread {
 };
 
 /// Calls step(i) for each i below count, as many at a time as there are threads, each with one
-/// thread of its own. After a step has thrown no other begins, and the first exception is thrown on.
+/// thread of its own. After a step has thrown no other begins, and the first exception is thrown
+/// on.
 void run_at_once(size_t count, const std::function<void(size_t)>& step);
 
 }  // namespace supple
