@@ -43,6 +43,9 @@ struct MatchOptions {
   /// `automatic_map` finds a more plausible map than the features give, it is the guide of the
   /// first two thirds, whatever `guided_epochs` says.
   JointTrainOptions training;
+  /// Learning rates of the features are multiplied by this where no map guides them, > 0: they know
+  /// such shapes already, and larger steps on one pair take more from them than it teaches.
+  double unguided_rate = 0.2;
   int functions = 80;  ///< of functional maps and the signal, >= 1
   /// Meshes of more pairs of vertices than this are not adapted to (a step would take longer than
   /// some ten seconds), and their soft map is taken between 3,000 and 6,000 samples.

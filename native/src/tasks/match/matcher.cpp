@@ -67,9 +67,13 @@ struct Matcher::Impl {
 
   bool adapts() const { return !large && options.training.epochs > 0; }
   void start(std::vector<GuidePair> guides) {
-    options.training.guided_epochs = (2 * options.training.epochs + 2) / 3;
+    JointTrainOptions training = options.training;
+    training.guided_epochs = (2 * training.epochs + 2) / 3;
+    for (double& rate : training.feature_learning_rate) {
+      rate *= guides.empty() ? options.unguided_rate : 1.0;
+    }
     trainer.emplace(std::vector{surfaces[0], surfaces[1]}, std::vector{0, 0}, std::move(guides),
-                    networks, options.training);
+                    networks, training);
   }
   // The map without features, found once.
   const InitialMap& without_features(const ProgressRange& progress);
