@@ -103,6 +103,24 @@ TEST_F(Matching, AMorePlausibleMapGuidesTheAdaptationSlow) {
   EXPECT_EQ(alone.history()[0].guide_share, 0.0);
 }
 
+TEST_F(Matching, WithoutAGuideStepsAreShorter) {
+  const Prepared a = prepared(mesh), b = prepared(copy);
+  options.training.epochs = 1;
+  const auto moved = [&](double rate) {
+    options.unguided_rate = rate;
+    Matcher matcher(a, b, networks(), options);
+    matcher.adapt();
+    const auto now = matcher.networks().features.parameters.tensors();
+    double sum = 0.0;
+    for (const auto& [name, before] : networks().features.parameters.tensors()) {
+      sum += (now.at(name) - before).cast<double>().squaredNorm();
+    }
+    return std::sqrt(sum);
+  };
+  // Adam's steps are about as long as the learning rate.
+  EXPECT_NEAR(moved(0.2) / moved(1.0), 0.2, 0.05);
+}
+
 TEST_F(Matching, LargeMeshesAreMatchedBySamplesWithoutAdaptation) {
   options.training.epochs = 0;
   const Prepared a = prepared(mesh), b = prepared(copy);
@@ -138,6 +156,10 @@ TEST_F(Matching, RefusesWhatItCannotDo) {
                                [&] { Matcher(a, nullptr, networks(), options); }));
   options.training.epochs = -1;
   EXPECT_TRUE(test::fails_with(ErrorCode::bad_option, {"0 epochs"},
+                               [&] { Matcher(a, a, networks(), options); }));
+  options.training.epochs = 1;
+  options.unguided_rate = 0.0;
+  EXPECT_TRUE(test::fails_with(ErrorCode::bad_option, {"learning rate"},
                                [&] { Matcher(a, a, networks(), options); }));
 }
 
