@@ -18,8 +18,7 @@ namespace supple {
 namespace {
 
 constexpr Eigen::Index kFew = 20, kStep = 4;  // functions that ZoomOut starts from, and its steps
-constexpr Eigen::Index kFinest = 120;         // and those it ends with for nearest features
-constexpr int kFineStep = 10;
+constexpr int kFineStep = 10;                 // and its steps from the nearest features on
 constexpr Eigen::Index kSourceSamples = 3000, kTargetSamples = 6000;
 
 const PreparedMesh& checked(const std::shared_ptr<const PreparedMesh>& mesh, const char* which) {
@@ -82,13 +81,16 @@ struct Matcher::Impl {
 
   FeaturePair<float> features() const;  // of both surfaces, as adapted so far
   // C' of the features, source to target; of large meshes from samples.
-  RowMatrix<double> functional_map(const ProgressRange& progress) const;
+  RowMatrix<double> functional_map(const FeaturePair<float>& features,
+                                   const ProgressRange& progress) const;
   // What the features say: the vertices with the nearest features, which tell apart more than a
   // functional map can hold, made smooth by ZoomOut. Of large meshes the point map of `map`, C'.
-  InitialMap of_features(const RowMatrix<double>& map, const ProgressRange& progress) const;
+  InitialMap of_features(const initial_maps::MeshPair& pair, const FeaturePair<float>& features,
+                         const RowMatrix<double>& map, const ProgressRange& progress) const;
   // From its first few functions on by ZoomOut: features that lead roughly to the right place are
   // enough.
-  InitialMap upsampled(const RowMatrix<double>& map, const ProgressRange& progress) const;
+  static InitialMap upsampled(const initial_maps::MeshPair& pair, const RowMatrix<double>& map,
+                              const ProgressRange& progress);
   const MatchNetworks& now() const { return trainer.has_value() ? trainer->networks() : networks; }
 
   MatchOptions options;
@@ -125,8 +127,8 @@ FeaturePair<float> Matcher::Impl::features() const {
   return features;
 }
 
-RowMatrix<double> Matcher::Impl::functional_map(const ProgressRange& progress) const {
-  const FeaturePair<float> features = this->features();
+RowMatrix<double> Matcher::Impl::functional_map(const FeaturePair<float>& features,
+                                                const ProgressRange& progress) const {
   const MatchSurface &from = surfaces[0]->match, &to = surfaces[1]->match;
   if (!large) {
     return match<float>({&from, &to}, features, options.training.loss, progress)[0].soft_map;
@@ -146,16 +148,17 @@ RowMatrix<double> Matcher::Impl::functional_map(const ProgressRange& progress) c
                  pulled);
 }
 
-InitialMap Matcher::Impl::of_features(const RowMatrix<double>& map,
+InitialMap Matcher::Impl::of_features(const initial_maps::MeshPair& pair,
+                                      const FeaturePair<float>& features,
+                                      const RowMatrix<double>& map,
                                       const ProgressRange& progress) const {
-  const initial_maps::MeshPair pair(*source, *target);
   if (large) {
     return pair.finished(map, progress);
   }
-  const FeaturePair<float> features = this->features();
   const SoftMapPair<float> soft(features[0], features[1], options.training.loss.temperature);
   ZoomoutOptions rounds;
-  rounds.to = static_cast<int>(std::min({kFinest, source->basis.size(), target->basis.size()}));
+  rounds.to = static_cast<int>(
+      std::min({Eigen::Index(rounds.to), source->basis.size(), target->basis.size()}));
   rounds.from = static_cast<int>(std::min({map.rows(), map.cols(), Eigen::Index(rounds.to)}));
   rounds.step = kFineStep;
   const Zoomout found = zoomout(source->basis, target->basis,
@@ -164,9 +167,8 @@ InitialMap Matcher::Impl::of_features(const RowMatrix<double>& map,
   return pair.finished(found.point_map);
 }
 
-InitialMap Matcher::Impl::upsampled(const RowMatrix<double>& map,
-                                    const ProgressRange& progress) const {
-  const initial_maps::MeshPair pair(*source, *target);
+InitialMap Matcher::Impl::upsampled(const initial_maps::MeshPair& pair,
+                                    const RowMatrix<double>& map, const ProgressRange& progress) {
   const Eigen::Index few = std::min({kFew, map.rows(), map.cols(), pair.count});
   return pair.finished(
       sampled_zoomout(pair.source_functions, pair.target_functions, map.topLeftCorner(few, few),
@@ -176,7 +178,7 @@ InitialMap Matcher::Impl::upsampled(const RowMatrix<double>& map,
 
 InitialMap Matcher::features_map(ProgressRange progress) const {
   const RowMatrix<double> map =
-      impl_->functional_map(progress.stage("comparing features", 0.0, 0.8));
+      impl_->functional_map(impl_->features(), progress.stage("comparing features", 0.0, 0.8));
   return initial_maps::MeshPair(*impl_->source, *impl_->target)
       .finished(map, progress.stage("finding vertices", 0.8, 1.0));
 }
@@ -221,17 +223,20 @@ void Matcher::adapt(ProgressRange progress, const Watch& watch) {
 
 MatchResult Matcher::run(ProgressRange progress, const Watch& watch) {
   adapt(progress.stage("adapting to the pair", 0.0, 0.8), watch);
+  const FeaturePair<float> features = impl_->features();
   const RowMatrix<double> map =
-      impl_->functional_map(progress.stage("comparing features", 0.8, 0.84));
+      impl_->functional_map(features, progress.stage("comparing features", 0.8, 0.84));
+  const initial_maps::MeshPair pair(*impl_->source, *impl_->target);
   MatchResult result;
-  result.initial = impl_->of_features(map, progress.stage("finding vertices", 0.84, 0.86));
+  result.initial =
+      impl_->of_features(pair, features, map, progress.stage("finding vertices", 0.84, 0.86));
   const auto consider = [&](InitialMap other, bool automatic) {
     if (other.score.value() > result.initial.score.value()) {
       result.initial = std::move(other);
       result.automatic = automatic;
     }
   };
-  consider(impl_->upsampled(map, progress.stage("upsampling", 0.86, 0.88)), false);
+  consider(Impl::upsampled(pair, map, progress.stage("upsampling", 0.86, 0.88)), false);
   if (impl_->options.automatic) {
     consider(impl_->without_features(progress.stage("looking for other maps", 0.88, 0.96)), true);
   }
