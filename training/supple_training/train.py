@@ -21,7 +21,7 @@ import numpy as np
 import supple
 import typer
 from rich.table import Table
-from supple.cli.console import watched
+from supple.cli.console import Latest, watched
 
 from supple_training import pairs as pair_store
 from supple_training.console import DEFAULT_CACHE, console, pairs_with_progress, progress_bar
@@ -97,23 +97,10 @@ def with_maps(pairs: list[pair_store.Pair], seed: int) -> list[tuple]:
     ]
 
 
-class LatestStep:
-    """A callback for training; as text, how it stands."""
-
-    def __init__(self, total: int) -> None:
-        self._total = total
-        self._text = ""
-
-    def __call__(self, step: dict) -> None:
-        self._text = f"step {step['step'] + 1}/{self._total}, loss {step['loss']:.4f}"
-
-    def __str__(self) -> str:
-        return self._text
-
-
 def run_training(pairs: list[tuple], **options) -> tuple[supple.TrainResult, float]:
     """`supple.train` under a progress bar; returns its result and the seconds it took."""
-    latest = LatestStep(options["epochs"] * len(pairs))
+    total = options["epochs"] * len(pairs)
+    latest = Latest(lambda step: f"step {step['step'] + 1}/{total}, loss {step['loss']:.4f}")
     start = time.perf_counter()
     result = watched(
         "training",

@@ -30,19 +30,25 @@ def progress_bar() -> rich.progress.Progress:
     return rich.progress.Progress(*_COLUMNS, console=console, transient=True)
 
 
-class LatestLoss:
-    """A callback for training; as text, how it stands."""
+class Latest:
+    """A callback for training; as text, what `describe` says of what it was called with last."""
 
-    def __init__(self) -> None:
+    def __init__(self, describe: Callable[[object], str]) -> None:
+        self._describe = describe
         self._text = ""
 
-    def __call__(self, epoch: Epoch) -> None:
-        self._text = f"epoch {epoch.epoch + 1}, loss {epoch.loss['total']:.4g}"
-        if epoch.guide_share > 0:
-            self._text += f", to the guides {epoch.guide:.4g}"
+    def __call__(self, what: object) -> None:
+        self._text = self._describe(what)
 
     def __str__(self) -> str:
         return self._text
+
+
+def epoch_text(epoch: Epoch) -> str:
+    text = f"epoch {epoch.epoch + 1}, loss {epoch.loss['total']:.4g}"
+    if epoch.guide_share > 0:
+        text += f", to the guides {epoch.guide:.4g}"
+    return text
 
 
 def watched(label: str, work: Callable[[supple.Progress], _Result], note: object = "") -> _Result:

@@ -14,7 +14,7 @@ import supple
 
 from ..cases import write_mesh
 from ..matching import CONFIGURATIONS, EPOCHS
-from .console import LatestLoss, console, peak_mebibytes, watched, write_whole
+from .console import Latest, console, epoch_text, peak_mebibytes, watched, write_whole
 from .maps import prepared, print_notes, write_map, written
 
 Config = StrEnum("Config", {name: name for name in CONFIGURATIONS})
@@ -61,7 +61,7 @@ def match(
                 progress=p,
             ),
         )
-        loss = LatestLoss()
+        loss = Latest(epoch_text)
         result = watched("matching", lambda p: matcher.run(callback=loss, progress=p), loss)
         seconds = time.perf_counter() - began
         print_notes([*result.notes, *result.initial.notes])

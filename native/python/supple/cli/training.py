@@ -15,7 +15,7 @@ import supple
 
 from ..matching import TERMS, Epoch
 from ..shape_folders import FolderShape, read_shapes
-from .console import LatestLoss, console, peak_mebibytes, progress_bar, watched, write_whole
+from .console import Latest, console, epoch_text, peak_mebibytes, progress_bar, watched, write_whole
 from .matching import Config
 
 
@@ -89,7 +89,7 @@ def train_unsupervised(
         shapes = read_shapes(folder, seed=seed)
         meshes = _prepared(shapes, cache=cache)
         began = time.perf_counter()
-        loss = LatestLoss()
+        loss = Latest(epoch_text)
         result = watched(
             "training",
             lambda p: supple.train_unsupervised(
