@@ -11,11 +11,10 @@ namespace supple {
 /// max(value, 1). None where the mesh has too few vertices for a coarse space with room for them;
 /// fewer where the coarse solver finds fewer.
 ///
-/// The mesh is coarsened algebraically (smoothed aggregation: Vanek, Mandel and Brezina 1996), the
-/// coarse eigenproblem solved exactly, its functions prolonged, and corrected by a few inverse
-/// iterations with Rayleigh-Ritz on the fine factor. One iteration takes an error along an
-/// eigenfunction of value v down by value / v, so what a coarse space misses, being rough, goes
-/// first.
+/// The mesh is coarsened algebraically (`coarse_space`), the coarse eigenproblem solved exactly,
+/// its functions prolonged, and corrected by one or two inverse iterations with Rayleigh-Ritz on
+/// the fine factor. One iteration takes an error along an eigenfunction of value v down by value /
+/// v, so what a coarse space misses, being rough, goes first.
 Pairs multiresolution(const Eigenproblem& problem, Eigen::Index count, double residual,
                       const ProgressRange& progress);
 

@@ -70,6 +70,33 @@ TEST_F(Matching, FindsACopySlow) {
   EXPECT_GE(result.initial.score.value(), matcher.features_map().score.value());
 }
 
+// A ball with four bumps at places of its own.
+zoo::Mesh bumpy(int seed) {
+  zoo::Mesh mesh = zoo::perturbed_sphere(3, seed);
+  const Points bumps = test::noise(4, 3, static_cast<uint64_t>(seed) * 7 + 1);
+  for (Eigen::Index i = 0; i < mesh.vertices.rows(); ++i) {
+    auto v = mesh.vertices.row(i);
+    double factor = 1.0;
+    for (int b = 0; b < 4; ++b) {
+      factor += (0.4 + 0.3 * b) * std::exp(-8.0 * (v - bumps.row(b).normalized()).squaredNorm());
+    }
+    v *= factor;
+    v[2] *= 0.7;
+  }
+  return mesh;
+}
+
+TEST_F(Matching, AMapFromTheOtherSideIsTakenWhereItIsMorePlausibleSlow) {
+  const Prepared a = prepared(bumpy(5)), b = prepared(bumpy(48));
+  const double there = automatic_map(*a, *b).score.value();
+  ASSERT_GT(automatic_map(*b, *a).score.value(), there + 0.05);
+  options.automatic = true;
+  options.training.epochs = 0;
+  const MatchResult result = Matcher(a, b, networks(), options).run();
+  EXPECT_TRUE(result.automatic);
+  EXPECT_GT(result.initial.score.value(), there);
+}
+
 TEST_F(Matching, GoesOnAfterACancelledRunAndRepeatsItself) {
   const Prepared a = prepared(mesh), b = prepared(copy);
   Matcher stopped(a, b, networks(), options);

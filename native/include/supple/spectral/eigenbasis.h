@@ -14,8 +14,8 @@ namespace supple {
 enum class EigenMethod {
   automatic,     ///< `block_krylov`
   block_krylov,  ///< shift-invert block Krylov-Schur on the Cholesky factor
-  /// A coarse basis, prolonged and corrected; residual 1e-2 instead of 1e-8. On meshes of less than
-  /// some 30 vertices a function, `block_krylov`.
+  /// A coarse basis, prolonged and corrected; residual 1e-2 instead of 1e-8. For large meshes: with
+  /// less than some 300 vertices a function, `block_krylov`.
   multiresolution,
   lanczos,  ///< shift-invert Lanczos by Spectra, the reference
   dense,    ///< every eigenvalue; chosen by itself on small meshes, whatever is asked

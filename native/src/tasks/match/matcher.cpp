@@ -74,7 +74,8 @@ struct Matcher::Impl {
     trainer.emplace(std::vector{surfaces[0], surfaces[1]}, std::vector{0, 0}, std::move(guides),
                     networks, training);
   }
-  // The map without features, found once.
+  // The map without features, found once: the more plausible of the two directions', which look in
+  // different places.
   const InitialMap& without_features(const ProgressRange& progress);
   // That map both ways, as the trainer wants it.
   GuidePair guide() const;
@@ -185,7 +186,23 @@ InitialMap Matcher::features_map(ProgressRange progress) const {
 
 const InitialMap& Matcher::Impl::without_features(const ProgressRange& progress) {
   if (!automatic.has_value()) {
-    automatic = automatic_map(*source, *target, progress);
+    InitialMap found =
+        automatic_map(*source, *target, progress.stage("looking for a first map", 0.0, 0.45));
+    const InitialMap back = automatic_map(
+        *target, *source, progress.stage("looking for one from the other side", 0.45, 0.9));
+    const initial_maps::MeshPair pair(*source, *target);
+    const Eigen::VectorXi on_surfaces = refining::to_surfaces(
+        target->mesh, source->mesh, refining::surface_anchor(source->mesh), back.point_map);
+    // Maps of equal areas are orthogonal, so the way there is the transpose.
+    InitialMap turned = upsampled(
+        pair,
+        supple::functional_map(target->basis, source->basis, on_surfaces, pair.count, pair.count)
+            .transpose(),
+        progress.stage("upsampling", 0.9, 1.0));
+    if (turned.score.value() > found.score.value()) {
+      found = std::move(turned);
+    }
+    automatic = std::move(found);
   }
   return *automatic;
 }
