@@ -66,9 +66,11 @@ Eigen::VectorXd mesh_falloff_weights(const PreparedMesh& prepared, const Eigen::
   return result;
 }
 
+// m x 9, read where the caller's array lies.
+using FieldView = Eigen::Ref<const MatrixField>;
+
 // The rotations of a `rotation` signal as they are: m x 9, one matrix a face.
-Signal signal_of(const PreparedMesh& prepared, const Network& network,
-                 const MatrixField& rotations) {
+Signal signal_of(const PreparedMesh& prepared, const Network& network, const FieldView& rotations) {
   if (network.architecture().signal != SignalKind::rotation) {
     throw Error(ErrorCode::bad_option, "This network takes the spectral signal, not rotations.");
   }
@@ -77,18 +79,20 @@ Signal signal_of(const PreparedMesh& prepared, const Network& network,
                 "There are " + std::to_string(rotations.rows()) + " rotations for a mesh of " +
                     std::to_string(prepared.operators.faces.rows()) + " faces.");
   }
-  return Signal{{rotations}};
+  Signal signal;  // a list in braces would be copied
+  signal.fields.emplace_back(rotations);
+  return signal;
 }
 
 MatrixField network_forward(const PreparedMesh& prepared, const Network& network,
-                            const MatrixField& rotations) {
+                            const FieldView& rotations) {
   return network.forward(*prepared.context_for(network.architecture()),
                          signal_of(prepared, network, rotations));
 }
 
 std::map<std::string, RowMatrix<float>> network_gradient(const PreparedMesh& prepared,
                                                          const Network& network,
-                                                         const MatrixField& rotations,
+                                                         const FieldView& rotations,
                                                          const MatrixField& grad) {
   const Signal signal = signal_of(prepared, network, rotations);
   if (grad.rows() != rotations.rows()) {

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native, arrays
-from .errors import SuppleError
 from .mesh import PreparedMesh
 from .model import Model, from_tensors
 
@@ -152,7 +151,7 @@ def network_forward(
         SuppleError: wrong_shape; bad_option for a network of the spectral signal.
     """
     return _native.network_forward(
-        prepared.native, model.native, _matrices(rotations, "rotations")
+        prepared.native, model.native, arrays.matrices(rotations, "rotations")
     ).reshape(-1, 3, 3)
 
 
@@ -167,13 +166,8 @@ def network_gradient(
         grad: (m, 3, 3), with respect to what network_forward returns.
     """
     return _native.network_gradient(
-        prepared.native, model.native, _matrices(rotations, "rotations"), _matrices(grad, "grad")
+        prepared.native,
+        model.native,
+        arrays.matrices(rotations, "rotations"),
+        arrays.matrices(grad, "grad"),
     )
-
-
-def _matrices(values: ArrayLike, what: str) -> NDArray[np.float64]:
-    """(m, 3, 3) as (m, 9)."""
-    values = np.asarray(values, dtype=np.float64)
-    if values.ndim != 3 or values.shape[1:] != (3, 3):
-        raise SuppleError("wrong_shape", f"{what} has shape {values.shape}; it must be (m, 3, 3).")
-    return np.ascontiguousarray(values.reshape(-1, 9))

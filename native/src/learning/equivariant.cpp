@@ -315,11 +315,12 @@ RowMatrix<Scalar> invariants(const NetworkContext<Scalar>& context, const Fields
 }
 
 template <class Scalar>
-std::vector<Combination<Scalar>> combine_at_vertices(const NetworkContext<Scalar>& context,
-                                                     const Fields<Scalar>& fields,
-                                                     const RowMatrix<Scalar>& outputs) {
+Combinations<Scalar> combine_at_vertices(const NetworkContext<Scalar>& context,
+                                         const Fields<Scalar>& fields,
+                                         const RowMatrix<Scalar>& outputs) {
   const Reference<Scalar> reference(fields.reference);
-  std::vector<Combination<Scalar>> at_vertices(static_cast<size_t>(context.functions.rows()));
+  auto at_vertices = std::make_unique_for_overwrite<Combination<Scalar>[]>(
+      static_cast<size_t>(context.functions.rows()));
   const auto combine = best_kernel(&Kernels<Scalar>::combine_avx512, &Kernels<Scalar>::combine_avx2,
                                    &Kernels<Scalar>::combine_plain);
   for_each_chunk(
@@ -328,8 +329,8 @@ std::vector<Combination<Scalar>> combine_at_vertices(const NetworkContext<Scalar
         add_tall_product<Scalar>(Scalar(1), {context.functions.middleRows(first, rows)}, outputs,
                                  c);
         CombineTask<Scalar> task{
-            {bands.fields()},          bands.at(0, 0, 0), c.data(), rows, outputs.cols(), {}, {},
-            at_vertices.data() + first};
+            {bands.fields()},         bands.at(0, 0, 0), c.data(), rows, outputs.cols(), {}, {},
+            at_vertices.get() + first};
         std::copy_n(reference.matrix.data(), 9, task.reference);
         std::copy_n(reference.defect.data(), 9, task.defect);
         combine(task);
@@ -341,8 +342,7 @@ template <class Scalar>
 MatrixField correct_faces(const NetworkContext<Scalar>& context, const Fields<Scalar>& fields,
                           const RowMatrix<Scalar>& outputs) {
   const SurfaceOperators& operators = *context.operators;
-  const std::vector<Combination<Scalar>> at_vertices =
-      combine_at_vertices(context, fields, outputs);
+  const Combinations<Scalar> at_vertices = combine_at_vertices(context, fields, outputs);
   const Eigen::Index m = operators.faces.rows();
   MatrixField result(m, 9);
   FaceTask<Scalar> task{operators.faces.data(),
@@ -350,7 +350,7 @@ MatrixField correct_faces(const NetworkContext<Scalar>& context, const Fields<Sc
                         fields.signal->fields.front().data(),
                         fields.look->face_normals->data(),
                         {},
-                        at_vertices.data(),
+                        at_vertices.get(),
                         result.data()};
   std::copy_n(fields.reference.data(), 9, task.reference);
   const auto correct = best_kernel(&Kernels<Scalar>::correct_avx512, &Kernels<Scalar>::correct_avx2,
@@ -363,9 +363,9 @@ MatrixField correct_faces(const NetworkContext<Scalar>& context, const Fields<Sc
 }
 
 template <class Scalar>
-std::vector<Combination<Scalar>> combinations_backward(const Fields<Scalar>& fields,
-                                                       const MatrixField& grad) {
-  std::vector<Combination<Scalar>> at_faces(static_cast<size_t>(grad.rows()));
+Combinations<Scalar> combinations_backward(const Fields<Scalar>& fields, const MatrixField& grad) {
+  auto at_faces =
+      std::make_unique_for_overwrite<Combination<Scalar>[]>(static_cast<size_t>(grad.rows()));
 #pragma omp parallel for schedule(static)
   for (Eigen::Index f = 0; f < grad.rows(); ++f) {
     const Face<Scalar> face = face_at(fields, f);
@@ -389,7 +389,7 @@ RowMatrix<Scalar> correct_faces_backward(const NetworkContext<Scalar>& context,
                                          const Fields<Scalar>& fields, const MatrixField& grad) {
   const SurfaceOperators& operators = *context.operators;
   const Reference<Scalar> reference(fields.reference);
-  const std::vector<Combination<Scalar>> at_faces = combinations_backward(fields, grad);
+  const Combinations<Scalar> at_faces = combinations_backward(fields, grad);
   const int outputs = output_count(static_cast<int>(fields.signal->fields.size()));
   RowMatrix<Scalar> at_vertices(operators.vertices.rows(), outputs);
   for_each_chunk(context, fields,
@@ -402,17 +402,16 @@ RowMatrix<Scalar> correct_faces_backward(const NetworkContext<Scalar>& context,
   return tall_product<Scalar>({context.functions}, at_vertices);
 }
 
-#define SUPPLE_INSTANTIATE(Scalar)                                                             \
-  template Fields<Scalar> project_fields(const NetworkContext<Scalar>&, const Signal&);        \
-  template RowMatrix<Scalar> invariants(const NetworkContext<Scalar>&, const Fields<Scalar>&); \
-  template MatrixField correct_faces(const NetworkContext<Scalar>&, const Fields<Scalar>&,     \
-                                     const RowMatrix<Scalar>&);                                \
-  template class SampleMatrices<Scalar>;                                                       \
-  template std::vector<Combination<Scalar>> combine_at_vertices(                               \
-      const NetworkContext<Scalar>&, const Fields<Scalar>&, const RowMatrix<Scalar>&);         \
-  template std::vector<Combination<Scalar>> combinations_backward(const Fields<Scalar>&,       \
-                                                                  const MatrixField&);         \
-  template RowMatrix<Scalar> correct_faces_backward(const NetworkContext<Scalar>&,             \
+#define SUPPLE_INSTANTIATE(Scalar)                                                                \
+  template Fields<Scalar> project_fields(const NetworkContext<Scalar>&, const Signal&);           \
+  template RowMatrix<Scalar> invariants(const NetworkContext<Scalar>&, const Fields<Scalar>&);    \
+  template MatrixField correct_faces(const NetworkContext<Scalar>&, const Fields<Scalar>&,        \
+                                     const RowMatrix<Scalar>&);                                   \
+  template class SampleMatrices<Scalar>;                                                          \
+  template Combinations<Scalar> combine_at_vertices(                                              \
+      const NetworkContext<Scalar>&, const Fields<Scalar>&, const RowMatrix<Scalar>&);            \
+  template Combinations<Scalar> combinations_backward(const Fields<Scalar>&, const MatrixField&); \
+  template RowMatrix<Scalar> correct_faces_backward(const NetworkContext<Scalar>&,                \
                                                     const Fields<Scalar>&, const MatrixField&);
 SUPPLE_INSTANTIATE(float)
 SUPPLE_INSTANTIATE(double)

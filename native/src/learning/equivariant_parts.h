@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 #include <vector>
 
 #include "equivariant.h"
@@ -15,7 +16,7 @@ namespace supple::equivariant {
 /// A 3x3 matrix takes 16 numbers, of which 9 are used: whole vectors, without a remainder.
 constexpr Eigen::Index kPadded = 16;
 /// Vertices worked on together, so that what they share stays in the cache.
-constexpr Eigen::Index kChunk = 2048;
+constexpr Eigen::Index kChunk = 512;
 
 template <class Scalar>
 Mat3<Scalar> matrix_of(const Scalar* numbers) {
@@ -103,22 +104,25 @@ void for_each_chunk(const NetworkContext<Scalar>& context, const Fields<Scalar>&
   }
 }
 
+/// One each of n vertices or m faces, not set to anything at first: threads touch their own.
+template <class Scalar>
+using Combinations = std::unique_ptr<Combination<Scalar>[]>;
+
 /// n: what each vertex contributes, for k x output_count coefficients.
 template <class Scalar>
-std::vector<Combination<Scalar>> combine_at_vertices(const NetworkContext<Scalar>& context,
-                                                     const Fields<Scalar>& fields,
-                                                     const RowMatrix<Scalar>& outputs);
+Combinations<Scalar> combine_at_vertices(const NetworkContext<Scalar>& context,
+                                         const Fields<Scalar>& fields,
+                                         const RowMatrix<Scalar>& outputs);
 
 /// m: from the m x 9 gradient with respect to the Jacobians, a face's part in that with respect to
 /// what each of its three corners contributes.
 template <class Scalar>
-std::vector<Combination<Scalar>> combinations_backward(const Fields<Scalar>& fields,
-                                                       const MatrixField& grad);
+Combinations<Scalar> combinations_backward(const Fields<Scalar>& fields, const MatrixField& grad);
 
 /// The sum of those parts over a vertex's faces.
 template <class Scalar>
 Combination<Scalar> gathered(const SurfaceOperators& operators,
-                             const std::vector<Combination<Scalar>>& at_faces, Eigen::Index v) {
+                             const Combinations<Scalar>& at_faces, Eigen::Index v) {
   Combination<Scalar> sum = {};
   // The averaging's pattern lists a vertex's faces.
   for (SparseRowMatrix::InnerIterator it(operators.average, v); it; ++it) {

@@ -129,7 +129,7 @@ class SignalGradient {
   void add_combinations(const RowMatrix<Scalar>& outputs, const MatrixField& grad) {
     const Layout layout{count_};
     const Mat3<Scalar> reference = fields_.reference.template cast<Scalar>();
-    const std::vector<Combination<Scalar>> at_faces = combinations_backward(fields_, grad);
+    const Combinations<Scalar> at_faces = combinations_backward(fields_, grad);
     const auto chunks = static_cast<size_t>(chunk_count(operators_.vertices.rows()));
     std::vector<RowMatrix<Scalar>> coefficients(chunks);
     std::vector<Matrix3> references(chunks, Matrix3::Zero());
@@ -173,8 +173,7 @@ class SignalGradient {
   // L, X_0 and C as faces see them:
   //   J = L + E - e (L - C) + P (F - f (L - C)) + D L + x (X_0 - L) + x' P (X_0 - L).
   void add_faces(const RowMatrix<Scalar>& outputs, const MatrixField& grad) {
-    const std::vector<Combination<Scalar>> at_vertices =
-        combine_at_vertices(context_, fields_, outputs);
+    const Combinations<Scalar> at_vertices = combine_at_vertices(context_, fields_, outputs);
     const Eigen::Index m = operators_.faces.rows();
     std::vector<Matrix3> references(static_cast<size_t>(chunk_count(m)), Matrix3::Zero());
 #pragma omp parallel for schedule(static)

@@ -105,7 +105,11 @@ SignalKind signal_kind(const std::string& name) {
 
 int field_count(SignalKind kind) { return kind == SignalKind::rotation ? 1 : 2; }
 
-Signal rotation_signal(const MatrixField& suggested) { return {{closest_rotations(suggested)}}; }
+Signal rotation_signal(const MatrixField& suggested) {
+  Signal signal;  // a list in braces would be copied, twice
+  signal.fields.push_back(closest_rotations(suggested));
+  return signal;
+}
 
 Signal spectral_signal(const SurfaceOperators& source, const Eigenbasis& basis,
                        const Points& coarse_target, Eigen::Index count) {
@@ -124,7 +128,10 @@ Signal spectral_signal(const SurfaceOperators& source, const Points& coarse_sour
     matrix_at(coarse, f) =
         faces.regular_inverse(f) * (matrix_at(faces.cross, f) + kTrust * rotation);
   }
-  return {{jacobians(source.inverse_frames, faces.to), std::move(coarse)}};
+  Signal signal;
+  signal.fields.push_back(jacobians(source.inverse_frames, faces.to));
+  signal.fields.push_back(std::move(coarse));
+  return signal;
 }
 
 Points spectral_signal_backward(const SurfaceOperators& source, const Points& coarse_source,
