@@ -119,7 +119,7 @@ FIRST_MAPS = {
 FEATURES = "FEATURES"
 STARTS = (*FIRST_MAPS, FEATURES)
 
-WITHOUT_FEATURES = "A map found without the features was more plausible, and was taken."
+WITHOUT_FEATURES = "A map found without the features bore refining better, and was taken."
 
 
 def _texts(result):

@@ -70,7 +70,7 @@ class MatchResult:
         refined: RefineResult: point_map, surface_map, recovered (the source laid onto the target),
             confidence, ...
         initial: InitialMap: the map that was refined, with its plausibility and notes.
-        automatic: it came from automatic_map, which was more plausible than what the features gave.
+        automatic: it came from automatic_map, whose maps bore refining better than the features'.
         history: Epoch of each epoch of adaptation to the pair.
         notes: where the two meshes differ in what a map can't respect; "not_adapted" where they are
             too large for it.
@@ -103,8 +103,9 @@ class Matcher:
             without the deformation's part; "ulrssm" (Cao et al. 2023) or "cdfm" (Sun et al. 2023).
             All but "ljn" also refine without the network.
         epochs: of adaptation to the pair, two steps each; 0 for the features as they are.
-        automatic: also look for a map without features; where it is more plausible it guides the
-            adaptation, and the more plausible one in the end is refined.
+        automatic: also look for a map without features, from both sides; where it bears refining
+            better it guides the adaptation. In the end all are refined, and the most confident is
+            returned.
         seed: of the order of steps.
         progress: a Progress to watch and cancel.
 
@@ -179,7 +180,7 @@ class Matcher:
         callback: Callable[[Epoch], None] | None = None,
         progress: _native.Progress | None = None,
     ) -> MatchResult:
-        """Adapt to the pair, then refine the map of the features or a more plausible one.
+        """Adapt to the pair, then refine the maps found, and return the most confident.
 
         Goes on where a cancelled run left off. The native work runs without the GIL.
 

@@ -40,8 +40,9 @@ GuideMaps guide_maps(const PreparedMesh& first, const PreparedMesh& second, int 
 
 struct MatchOptions {
   /// Adaptation to the pair: 2 steps an epoch; 0 epochs: the features as they are. Where
-  /// `automatic_map` finds a more plausible map than the features give, it is the guide of the
-  /// first two thirds, whatever `guided_epochs` says.
+  /// `automatic_map`, from either side, finds a map that bears refining better than what the
+  /// features give (`RefineResult::confidence` in the mean), it is the guide of the first two
+  /// thirds, whatever `guided_epochs` says.
   JointTrainOptions training;
   /// Learning rates of the features are multiplied by this where no map guides them, > 0: they know
   /// such shapes already, and larger steps on one pair take more from them than it teaches.
@@ -50,8 +51,8 @@ struct MatchOptions {
   /// Meshes of more pairs of vertices than this are not adapted to (a step would take longer than
   /// some ten seconds), and their soft map is taken between 3,000 and 6,000 samples.
   double most_pairs = 1.5e8;
-  /// Also look for a map without features (`automatic_map`); the more plausible one guides the
-  /// adaptation and, after it, is refined.
+  /// Also look for a map without features (`automatic_map`, from both sides). The one that bears
+  /// refining better guides the adaptation; after it, all are refined and the best is returned.
   bool automatic = true;
   /// More rounds than by default: the maps found here have drifted farther.
   RefineOptions refine;
@@ -84,8 +85,8 @@ class Matcher {
   /// Adapts the networks to the pair, if they are not yet. Goes on where a cancelled call left off.
   /// Errors: those of `JointTrainer::epoch`.
   void adapt(ProgressRange progress = {}, const Watch& watch = {});
-  /// Adapts, then refines the map of the features, or a more plausible one, with the second network
-  /// (or none). Errors: those of `adapt`.
+  /// Adapts, then refines the maps of the features and the one without them with the second network
+  /// (or none), and returns the most confident. Errors: those of `adapt`.
   MatchResult run(ProgressRange progress = {}, const Watch& watch = {});
   const std::vector<JointEpoch>& history() const;  ///< of adaptation so far
   const MatchNetworks& networks() const;           ///< as adapted so far
