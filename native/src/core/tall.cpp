@@ -213,10 +213,17 @@ void pack(const Scalar* from, Eigen::Index stride, Eigen::Index rows, Eigen::Ind
   }
 }
 
-int thread_share(Eigen::Index rows) {
+// The rows are always shared out into as many parts, so that no sum depends on the number of
+// threads.
+constexpr Eigen::Index kMostParts = 16;
+
+int parts_of(Eigen::Index rows) {
   const Eigen::Index tiles = (rows + kTileRows - 1) / kTileRows;
-  return static_cast<int>(
-      std::clamp<Eigen::Index>(tiles / 2, 1, omp_in_parallel() ? 1 : omp_get_max_threads()));
+  return static_cast<int>(std::clamp<Eigen::Index>(tiles / 2, 1, kMostParts));
+}
+
+int threads_for(int parts) {
+  return omp_in_parallel() ? 1 : std::min(parts, omp_get_max_threads());
 }
 
 void check(bool fits, const char* what) {
@@ -242,7 +249,7 @@ RowMatrix<Scalar> tall_product(const TallPieces<Scalar>& a, const ConstTallBlock
   const Eigen::Index width = packed_width<Scalar>(b.cols());
   const Eigen::Index n = b.rows(), k = columns_of(a, n, "tall_product"),
                      groups = (b.cols() + width - 1) / width;
-  const int parts = thread_share(n);
+  const int parts = parts_of(n), threads = threads_for(parts);
   const TallKernel<Scalar> transpose_product = width == kWhole<Scalar>
                                                    ? Kernels<Scalar, kWhole<Scalar>>::transpose()
                                                    : Kernels<Scalar, kHalf<Scalar>>::transpose();
@@ -251,7 +258,7 @@ RowMatrix<Scalar> tall_product(const TallPieces<Scalar>& a, const ConstTallBlock
     sums.emplace_back(groups * k * width);
     packed.emplace_back(kTileRows * width);
   }
-#pragma omp parallel for schedule(static, 1) num_threads(parts) if (parts > 1)
+#pragma omp parallel for schedule(static) num_threads(threads) if (threads > 1)
   for (int part = 0; part < parts; ++part) {
     Scalar* const right = packed[static_cast<size_t>(part)].data();
     const Eigen::Index last = n * (part + 1) / parts;
@@ -287,7 +294,7 @@ void add_tall_product(Scalar alpha, const TallPieces<Scalar>& a, const RowMatrix
   const Eigen::Index n = b.rows(), k = columns_of(a, n, "add_tall_product"),
                      groups = (c.cols() + width - 1) / width;
   check(c.rows() == k && c.cols() == b.cols(), "add_tall_product");
-  const int parts = thread_share(n);
+  const int parts = parts_of(n), threads = threads_for(parts);
   const TallKernel<Scalar> tile_product = width == kWhole<Scalar>
                                               ? Kernels<Scalar, kWhole<Scalar>>::product()
                                               : Kernels<Scalar, kHalf<Scalar>>::product();
@@ -299,7 +306,7 @@ void add_tall_product(Scalar alpha, const TallPieces<Scalar>& a, const RowMatrix
   }
   std::vector<Aligned<Scalar>> products(static_cast<size_t>(parts),
                                         Aligned<Scalar>(kTileRows * width));
-#pragma omp parallel for schedule(static, 1) num_threads(parts) if (parts > 1)
+#pragma omp parallel for schedule(static) num_threads(threads) if (threads > 1)
   for (int part = 0; part < parts; ++part) {
     Scalar* const product = products[static_cast<size_t>(part)].data();
     const Eigen::Index last = n * (part + 1) / parts;

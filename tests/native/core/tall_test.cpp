@@ -143,7 +143,7 @@ TYPED_TEST(Tall, ProductsAreRightToRounding) {
                   .all());
 }
 
-TYPED_TEST(Tall, SameBytesForTheSameThreadsAndCloseForOthers) {
+TYPED_TEST(Tall, SameBytesForAnyNumberOfThreads) {
   using Scalar = TypeParam;
   const RowMatrix<Scalar> a = test::noise(3000, 30, 1).cast<Scalar>(),
                           b = test::noise(3000, 11, 2).cast<Scalar>(),
@@ -156,14 +156,8 @@ TYPED_TEST(Tall, SameBytesForTheSameThreadsAndCloseForOthers) {
     return std::pair(tall_product<Scalar>(pieces, b), sum);
   };
   const auto one = both(1);
-  for (const int threads : {1, 2, 3, 4}) {
-    const auto first = both(threads), second = both(threads);
-    EXPECT_EQ(first, second) << threads << " threads";
-    // 1e-12 in double: some thousand roundings of 2e-16.
-    const double limit = 5000.0 * std::numeric_limits<Scalar>::epsilon();
-    EXPECT_LT((first.first - one.first).norm(), limit * one.first.norm()) << threads << " threads";
-    EXPECT_LT((first.second - one.second).norm(), limit * one.second.norm())
-        << threads << " threads";
+  for (const int threads : {2, 3, 4, 20}) {
+    EXPECT_EQ(both(threads), one) << threads << " threads";
   }
 }
 

@@ -20,13 +20,14 @@ using ConstTallBlock = Eigen::Ref<const RowMatrix<Scalar>, 0, Eigen::OuterStride
 template <class Scalar>
 using TallPieces = std::vector<ConstTallBlock<Scalar>>;
 
-/// A^T B (k x c) of A (n x k) and B (n x c), float or double. Each thread takes some of the rows
-/// and the sums are added in order: the same bytes for the same number of threads.
+/// A^T B (k x c) of A (n x k) and B (n x c), float or double. Some rows at a time, whose sums are
+/// added in order: the same bytes for any number of threads.
 /// Errors: `wrong_shape`.
 template <class Scalar>
 RowMatrix<Scalar> tall_product(const TallPieces<Scalar>& a, const ConstTallBlock<Scalar>& b);
 
-/// B += alpha A C of A (n x k), C (k x c) and B (n x c). Errors: `wrong_shape`.
+/// B += alpha A C of A (n x k), C (k x c) and B (n x c); also the same bytes for any number of
+/// threads. Errors: `wrong_shape`.
 template <class Scalar>
 void add_tall_product(Scalar alpha, const TallPieces<Scalar>& a, const RowMatrix<Scalar>& c,
                       TallBlock<Scalar> b);
