@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The number of threads changes how long things take, and not one byte of what comes out."""
+"""The number of threads changes how long it takes to prepare, edit and map, and not one byte."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def threads():
     supple.set_thread_count(before)
 
 
-def test_edits_and_refined_maps_are_the_same_bytes_with_any_number_of_threads(blob, threads):
+def test_meshes_edits_and_maps_are_the_same_bytes_with_any_number_of_threads(blob, threads):
     source, target = blob(3000, 1), blob(2500, 2, bend=0.4)
     rough = source.nearest(target)
     order = np.argsort(source.vertices[:, 0])
@@ -27,12 +27,15 @@ def test_edits_and_refined_maps_are_the_same_bytes_with_any_number_of_threads(bl
 
     def results(count: int) -> dict[str, np.ndarray]:
         threads(count)
-        a = supple.PreparedMesh(source.vertices, source.faces)
-        b = supple.PreparedMesh(target.vertices, target.faces)
+        a = supple.PreparedMesh(source.vertices, source.faces, cache=False)
+        b = supple.PreparedMesh(target.vertices, target.faces, cache=False)
+        bent = supple.geometry.jacobians(source.vertices, source.faces, source.vertices * [1, 1, 2])
+        turned = supple.geometry.closest_rotations(bent)
         editor = supple.Editor(a, handles)
         refined = supple.refine(a, b, rough)
         return {
             "eigenvalues": a.native.eigenvalues,
+            "network": supple.learning.network_forward(a, supple.load_model("rotation"), turned),
             "natural": editor.solve(moved, mode="natural").vertices,
             "stiff": editor.solve(moved, mode="stiff").vertices,
             "arap": editor.solve(moved, method="arap").vertices,

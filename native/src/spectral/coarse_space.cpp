@@ -2,6 +2,7 @@
 #include "coarse_space.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "supple/core/sparse_product.h"
@@ -55,10 +56,6 @@ Aggregates aggregates(const SparseRowMatrix& matrix) {
         joined[i] = aggregate[it.col()];
       }
     }
-    if (joined[i] < 0) {
-      roots[next] = i;
-      joined[i] = next++;
-    }
   }
   return {std::move(joined), roots.head(next)};
 }
@@ -107,9 +104,15 @@ CoarseSpace coarse_space(const SparseMatrix& laplacian, const Eigen::VectorXd& m
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
     p = thinned(sparse_product(average, p), kLeastAtFirst);
   }
-  SparseRowMatrix step = rows;  // 1 - damping D^-1 W; a row whose diagonal a sliver has spoilt: 1
+  SparseRowMatrix step = rows;  // 1 - damping D^-1 W, D half the sum of a row's sizes: its
+                                // diagonal, where no weight is negative
   for (Eigen::Index i = 0; i < step.rows(); ++i) {
-    const double diagonal = laplacian.coeff(i, i);
+    // Obtuse corners can leave a diagonal far below the row's other entries.
+    double around = 0.0;
+    for (SparseRowMatrix::InnerIterator it(rows, i); it; ++it) {
+      around += std::abs(it.value());
+    }
+    const double diagonal = around / 2.0;
     for (SparseRowMatrix::InnerIterator it(step, i); it; ++it) {
       it.valueRef() =
           double(it.col() == i) - (diagonal > 0.0 ? kDamping / diagonal * it.value() : 0.0);

@@ -19,7 +19,7 @@ struct CoarseSpace {
 /// Columns are near hat functions of some vertices, their roots: 1 at the root and 0 at the others,
 /// about harmonic between them, then smoothed a little. The cotangent Laplacian of a plane takes
 /// linear functions to 0, so they are near the space. Smoothed aggregation (Vanek, Mandel and
-/// Brezina 1996) has constants alone, and eigenvalues that are off by half however fine it is.
+/// Brezina 1996) has constants alone, and eigenvalues that are off by 70% however fine it is.
 CoarseSpace coarse_space(const SparseMatrix& laplacian, const Eigen::VectorXd& mass, int rings);
 
 }  // namespace supple

@@ -9,6 +9,7 @@
 #include "coarse_space.h"
 #include "copies.h"
 #include "supple/core/dense.h"
+#include "supple/core/parallel.h"
 #include "supple/core/tall.h"
 
 namespace supple {
@@ -61,8 +62,13 @@ Eigen::VectorXd correct(const Eigenproblem& problem, RowMatrix<double>& x) {
   const Eigen::VectorXd size = symmetric_eigen(gram);
   const Eigen::MatrixXd root =
       gram * size.cwiseMax(1e-14 * size.maxCoeff()).cwiseSqrt().cwiseInverse().asDiagonal();
-  Eigen::MatrixXd small = root.transpose() * energy * root;
-  const Eigen::VectorXd values = symmetric_eigen(small);
+  Eigen::MatrixXd small;
+  Eigen::VectorXd values;
+  {
+    const SingleThread alone;  // Eigen's threads would change the order of the sums
+    small = root.transpose() * energy * root;
+    values = symmetric_eigen(small);
+  }
   x.setZero();
   add_tall_product<double>(1.0, {y}, root * small, x);
   return values.array() - problem.shift();
@@ -76,12 +82,17 @@ Pairs multiresolution(const Eigenproblem& problem, Eigen::Index count, double re
   // wanted value to its own at each correction.
   const Eigen::Index space = count + std::max<Eigen::Index>(8, count / 8);
   const Eigen::Index all = space + problem.kernel_size();
+  const Pairs none{Eigen::VectorXd(0), RowMatrix<double>(problem.size(), 0)};
+  if (problem.size() < 4 * kRoom * all) {  // a region of one ring has four vertices or more
+    return none;
+  }
   CoarseSpace level = coarse_space(problem.laplacian(), problem.mass(), 2);
   if (level.mass.size() < kAmple * all) {
+    progress.report(0.1);
     level = coarse_space(problem.laplacian(), problem.mass(), 1);
   }
   if (level.mass.size() < kRoom * all) {
-    return {Eigen::VectorXd(0), RowMatrix<double>(problem.size(), 0)};
+    return none;
   }
   progress.report(0.2);
   Pairs pairs;
@@ -98,6 +109,9 @@ Pairs multiresolution(const Eigenproblem& problem, Eigen::Index count, double re
         });
   }
   count = std::min(count, pairs.size());
+  if (count == 0) {
+    return none;
+  }
   pairs.vectors = prolonged(level, pairs.vectors, problem.root_mass());
   level = {};
   problem.leave_kernel(pairs.vectors);

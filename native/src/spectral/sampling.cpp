@@ -7,6 +7,8 @@
 #include <numeric>
 #include <vector>
 
+#include "supple/core/tall.h"
+
 namespace supple {
 namespace {
 
@@ -85,8 +87,9 @@ SpectralDomain<Scalar> sampled_domain(const Eigenbasis& basis, Eigen::Index coun
   for (Eigen::Index i = 0; i < points.rows(); ++i) {
     weight[owner[i]] += basis.mass[i];
   }
-  const Eigen::MatrixXd weighted = weight.asDiagonal() * functions;
-  Eigen::MatrixXd gram = functions.transpose() * weighted;
+  const RowMatrix<double> weighted = weight.asDiagonal() * functions;
+  // Not by Eigen, whose threads change the order of the sums.
+  Eigen::MatrixXd gram = tall_product<double>({functions}, weighted);
   // The mass of a tiny separate piece can leave the Gram matrix near singular; this keeps it
   // solvable without moving a well-conditioned one.
   gram.diagonal().array() += 1e-10;

@@ -43,7 +43,7 @@ TEST_P(CoarseSpaceZoo, KeepsConstantsAndTheArea) {
 SUPPLE_OVER_THE_ZOO(CoarseSpaceZoo);
 
 // Linear functions are near it: eigenvalues within some percent, where plain smoothed aggregation
-// is off by half.
+// is off by 70%.
 TEST(CoarseSpace, HasNearlyTheEigenvaluesOfTheMesh) {
   for (const zoo::Mesh& mesh : {zoo::perturbed_sphere(5, 7), zoo::grid(60, 50, 0.04)}) {
     const SparseMatrix laplacian = cotan_laplacian(mesh.vertices, mesh.faces);

@@ -15,7 +15,7 @@ enum class EigenMethod {
   automatic,     ///< `block_krylov`
   block_krylov,  ///< shift-invert block Krylov-Schur on the Cholesky factor
   /// A coarse basis, prolonged and corrected; residual 1e-2 instead of 1e-8. For large meshes: with
-  /// less than some 300 vertices a function, `block_krylov`.
+  /// less than some 200 vertices a function (more where few are wanted), `block_krylov`.
   multiresolution,
   lanczos,  ///< shift-invert Lanczos by Spectra, the reference
   dense,    ///< every eigenvalue; chosen by itself on small meshes, whatever is asked

@@ -99,8 +99,7 @@ class Editor {
          const Editor* former = nullptr);
 
   /// targets: one a handle, in order. start: the pose to edit; nullptr for the rest shape. The same
-  /// bytes for the same targets, options, start and number of threads. Safe to call from several
-  /// threads.
+  /// bytes for the same targets, options and start. Safe to call from several threads.
   /// Errors: `wrong_shape`, `not_finite`, `singular_matrix`, `bad_option`, `cancelled`.
   EditResult solve(const std::vector<HandleTarget>& targets, const EditOptions& options = {},
                    ProgressRange progress = {},

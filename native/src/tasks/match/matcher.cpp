@@ -82,6 +82,10 @@ struct Matcher::Impl {
     trainer.emplace(std::vector{surfaces[0], surfaces[1]}, std::vector{0, 0}, std::move(guides),
                     networks, training);
   }
+  // Without a network.
+  double standing_of(const InitialMap& map, const ProgressRange& progress) const {
+    return standing(map, refiner.refine(map.point_map, progress));
+  }
   // The map without features, found once: that of the direction, as they look in different places,
   // which bears refining better.
   const InitialMap& without_features(const ProgressRange& progress);
@@ -107,9 +111,12 @@ struct Matcher::Impl {
   std::array<std::shared_ptr<const JointSurface<float>>, 2> surfaces;
   MatchNetworks networks;  // as given
   std::optional<JointTrainer> trainer;
-  Refiner refiner;  // for its notes and checks before the long work; refining takes the adapted one
+  // Without a network: for its notes and checks before the long work, and to compare first maps. In
+  // the end refining takes the adapted network.
+  Refiner refiner;
   std::vector<Note> notes;
   std::optional<InitialMap> automatic;
+  double automatic_standing = 0.0;
   bool large = false;  // too large for a soft map of every vertex
 };
 
@@ -207,12 +214,16 @@ const InitialMap& Matcher::Impl::without_features(const ProgressRange& progress)
         supple::functional_map(target->basis, source->basis, on_surfaces, pair.count, pair.count)
             .transpose(),
         progress.stage("upsampling", 0.9, 0.92));
-    const auto stands = [&](const InitialMap& map, double from) {
-      return standing(map,
-                      refiner.refine(map.point_map, progress.stage("refining", from, from + 0.04)));
-    };
-    if (stands(turned, 0.92) > stands(found, 0.96)) {
+    for (const Note& note : back.notes) {
+      if (note.code == "uncertain") {  // the shapes are symmetric, whichever side one looks from
+        turned.notes.push_back(note);
+      }
+    }
+    automatic_standing = standing_of(found, progress.stage("refining", 0.92, 0.96));
+    const double other = standing_of(turned, progress.stage("refining", 0.96, 1.0));
+    if (other > automatic_standing) {
       found = std::move(turned);
+      automatic_standing = other;
     }
     automatic = std::move(found);
   }
@@ -232,13 +243,9 @@ void Matcher::adapt(ProgressRange progress, const Watch& watch) {
   if (impl_->adapts() && impl_->options.automatic && history().empty()) {
     const ProgressRange looking = progress.stage("looking for a first map", 0.0, 0.1);
     const InitialMap features = features_map(looking.stage("comparing features", 0.0, 0.3));
-    const InitialMap& other =
-        impl_->without_features(looking.stage("looking for a first map", 0.3, 0.9));
-    const auto stands = [&](const InitialMap& map, double from) {
-      return standing(
-          map, impl_->refiner.refine(map.point_map, looking.stage("refining", from, from + 0.05)));
-    };
-    if (stands(other, 0.9) > stands(features, 0.95)) {
+    const double known = impl_->standing_of(features, looking.stage("refining", 0.3, 0.4));
+    impl_->without_features(looking.stage("looking for a first map", 0.4, 1.0));
+    if (impl_->automatic_standing > known) {
       impl_->start({impl_->guide()});
     }
     progress = progress.stage("adapting to the pair", 0.1, 1.0);
