@@ -718,12 +718,12 @@ def nearest_rows(
 def network_forward(
     prepared: PreparedMesh,
     network: Network,
-    rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 9]"],
+    rotations: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"],
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]: ...
 def network_gradient(
     prepared: PreparedMesh,
     network: Network,
-    rotations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 9]"],
+    rotations: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"],
     grad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 9]"],
 ) -> dict[str, typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]"]]: ...
 def part_of_motion(
