@@ -4,6 +4,7 @@ triangulation, order and place."""
 
 import _thread
 import json
+import signal
 import time
 from dataclasses import replace
 
@@ -198,6 +199,11 @@ def test_ctrl_c_cancels_and_waits_for_what_was_started():
         time.sleep(0.1)  # the way back from the last thing that cannot be stopped
         ended.append(progress.cancelled)
 
-    with pytest.raises(KeyboardInterrupt):
-        watched("working", work)
+    # Started in the background, a shell has it ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            watched("working", work)
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert ended == [True]
