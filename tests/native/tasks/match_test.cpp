@@ -100,6 +100,18 @@ TEST_F(Matching, AMapFromTheOtherSideIsTakenWhereItBearsRefiningBetterSlow) {
   EXPECT_GT(result.initial.score.value(), there);
 }
 
+TEST_F(Matching, SymmetricShapesSaySoFromWhicheverSideTheMapCame) {
+  const Prepared a = prepared(zoo::torus(40, 20)), b = prepared(zoo::torus(36, 22));
+  options.automatic = true;
+  options.training.epochs = 0;
+  for (const auto& [source, target] : {std::pair(a, b), std::pair(b, a)}) {
+    const MatchResult result = Matcher(source, target, networks(), options).run();
+    ASSERT_TRUE(result.automatic);
+    EXPECT_TRUE(std::any_of(result.initial.notes.begin(), result.initial.notes.end(),
+                            [](const Note& note) { return note.code == "uncertain"; }));
+  }
+}
+
 TEST_F(Matching, GoesOnAfterACancelledRunAndRepeatsItself) {
   const Prepared a = prepared(mesh), b = prepared(copy);
   Matcher stopped(a, b, networks(), options);
