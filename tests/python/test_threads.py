@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import supple
+from supple import geometry, learning
 
 
 @pytest.fixture
@@ -29,13 +30,13 @@ def test_meshes_edits_and_maps_are_the_same_bytes_with_any_number_of_threads(blo
         threads(count)
         a = supple.PreparedMesh(source.vertices, source.faces, cache=False)
         b = supple.PreparedMesh(target.vertices, target.faces, cache=False)
-        bent = supple.geometry.jacobians(source.vertices, source.faces, source.vertices * [1, 1, 2])
-        turned = supple.geometry.closest_rotations(bent)
+        bent = geometry.jacobians(source.vertices, source.faces, source.vertices * [1, 1, 2])
+        turned = geometry.closest_rotations(bent)
         editor = supple.Editor(a, handles)
         refined = supple.refine(a, b, rough)
         return {
             "eigenvalues": a.native.eigenvalues,
-            "network": supple.learning.network_forward(a, supple.load_model("rotation"), turned),
+            "network": learning.network_forward(a, supple.load_model("rotation"), turned),
             "natural": editor.solve(moved, mode="natural").vertices,
             "stiff": editor.solve(moved, mode="stiff").vertices,
             "arap": editor.solve(moved, method="arap").vertices,
