@@ -35,6 +35,15 @@ std::shared_ptr<const LocalJacobianNetwork<float>> refining_network(const MatchN
              : nullptr;
 }
 
+// k1 x k2, of a map of the callers' vertices.
+RowMatrix<double> functional_map_of(const PreparedMesh& source, const PreparedMesh& target,
+                                    const Eigen::VectorXi& point_map, Eigen::Index k1,
+                                    Eigen::Index k2) {
+  const Eigen::VectorXi on_surfaces = refining::to_surfaces(
+      source.mesh, target.mesh, refining::surface_anchor(target.mesh), point_map);
+  return functional_map(source.basis, target.basis, on_surfaces, k1, k2);
+}
+
 // How well a map bears refining: a wrong one leaves the laid surface off the target, turned away
 // from it, or led elsewhere on the way back. Of 36 maps between creatures, the most confident of
 // three was 7% nearer to the truth than the one of the best score, which settles what is alike.
@@ -206,13 +215,10 @@ const InitialMap& Matcher::Impl::without_features(const ProgressRange& progress)
     const InitialMap back = automatic_map(
         *target, *source, progress.stage("looking for one from the other side", 0.45, 0.9));
     const initial_maps::MeshPair pair(*source, *target);
-    const Eigen::VectorXi on_surfaces = refining::to_surfaces(
-        target->mesh, source->mesh, refining::surface_anchor(source->mesh), back.point_map);
     // Maps of equal areas are orthogonal, so the way there is the transpose.
     InitialMap turned = upsampled(
         pair,
-        supple::functional_map(target->basis, source->basis, on_surfaces, pair.count, pair.count)
-            .transpose(),
+        functional_map_of(*target, *source, back.point_map, pair.count, pair.count).transpose(),
         progress.stage("upsampling", 0.9, 0.92));
     for (const Note& note : back.notes) {
       if (note.code == "uncertain") {  // the shapes are symmetric, whichever side one looks from
@@ -231,10 +237,8 @@ const InitialMap& Matcher::Impl::without_features(const ProgressRange& progress)
 }
 
 GuidePair Matcher::Impl::guide() const {
-  const Eigen::VectorXi there = refining::to_surfaces(
-      source->mesh, target->mesh, refining::surface_anchor(target->mesh), automatic->point_map);
   const Eigen::Index k1 = surfaces[0]->match.values.size(), k2 = surfaces[1]->match.values.size();
-  const RowMatrix<double> map = supple::functional_map(source->basis, target->basis, there, k1, k2);
+  const RowMatrix<double> map = functional_map_of(*source, *target, automatic->point_map, k1, k2);
   // Maps of equal areas are orthogonal, so the way back is the transpose.
   return {0, 1, {map, RowMatrix<double>(map.transpose())}};
 }
