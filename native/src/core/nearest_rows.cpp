@@ -7,217 +7,185 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "nearest_kernels.h"
+#include "row_groups.h"
+#include "row_tiles.h"
 #include "supple/core/error.h"
-#include "supple/core/simd.h"
 
 namespace supple {
 namespace {
 
-constexpr float kNone = -std::numeric_limits<float>::max();  // less than any score
-// Queries that a thread works on at a time; their rows stay in the second-level cache.
-constexpr Eigen::Index kQueries = 384;  // a multiple of every kernel's width
-// Blocks of queries between two looks at the progress, a thread.
-constexpr Eigen::Index kBlocksBetweenReports = 2;
-// Tiles of points whose best scores are looked through together.
-constexpr Eigen::Index kTogether = 8;
+// Groups of queries that a thread takes at a time, and times it does between two looks at the
+// progress.
+constexpr Eigen::Index kGroups = 12, kTimesBetweenReports = 2;
+constexpr float kFar = 4.0F;  // beyond all rows, whose norms are at most 1
+// RowTiles that are looked into before the others, the most promising first.
+constexpr int kAhead = 16;
+// Rows of so many numbers or more are looked at in two steps.
+constexpr Eigen::Index kLong = 48;
 
-// Points in tiles of so many: within one, number by number (count x height), so that a kernel reads
-// them one after the other.
-struct Tiles {
-  Tiles(const RowMatrix<double>& points, double scale, Eigen::Index height_in)
-      : height(height_in),
-        numbers(points.cols()),
-        count((points.rows() + height - 1) / height),
-        values(static_cast<size_t>(count * height * numbers), 0.0F),
-        offsets(static_cast<size_t>(count * height), kNone) {
-    for (Eigen::Index i = 0; i < points.rows(); ++i) {
-      float* const tile = values.data() + (i / height) * height * numbers + i % height;
-      double norm = 0.0;
-      for (Eigen::Index j = 0; j < numbers; ++j) {
-        const double value = scale * points(i, j);
-        tile[j * height] = static_cast<float>(value);
-        norm += value * value;
-      }
-      offsets[static_cast<size_t>(i)] = static_cast<float>(-0.5 * norm);
-    }
-  }
-
-  Eigen::Index height, numbers, count;
-  std::vector<float> values, offsets;  // offsets: -|y|^2 / 2; kNone fills the last tile up
-};
-
-// Some queries against all points. The score of a point y for a query x is x . y - |y|^2 / 2, the
-// larger the nearer.
-struct Block {
-  const Tiles* tiles;
-  const float* queries;  // tiles of the kernel's width, number by number, as the points
-  Eigen::Index count;    // queries, a multiple of the kernel's width
-  float* best;           // count: the best score of each
-  float* tile_best;      // tiles x count: the best score of each among a tile's points
-};
-
-template <int Bytes>
-using Vector = typename Lanes<float, Bytes>::type;
-
-// By reference: a vector wider than plain x86-64's is no value to return.
-template <int Bytes>
-SUPPLE_INLINE void load(const float* from, Vector<Bytes>& value) {
-  typedef Vector<Bytes> Unaligned __attribute__((aligned(4), may_alias));
-  value = *reinterpret_cast<const Unaligned*>(from);
-}
-template <int Bytes>
-SUPPLE_INLINE void store(float* to, const Vector<Bytes>& value) {
-  typedef Vector<Bytes> Unaligned __attribute__((aligned(4), may_alias));
-  *reinterpret_cast<Unaligned*>(to) = value;
+std::vector<int> in_order(Eigen::Index count) {
+  std::vector<int> order(static_cast<size_t>(count));
+  std::iota(order.begin(), order.end(), 0);
+  return order;
 }
 
-// Two vectors of queries against Height points, whose scores stay in registers.
-template <int Bytes, int Height>
-SUPPLE_INLINE void score_body(const Block& block) {
-  using V = Vector<Bytes>;
-  constexpr Eigen::Index lanes = Lanes<float, Bytes>::count, width = 2 * lanes;
-  const Eigen::Index numbers = block.tiles->numbers;
-  for (Eigen::Index t = 0; t < block.tiles->count; ++t) {
-    const float* const points = block.tiles->values.data() + t * Height * numbers;
-    const float* const offsets = block.tiles->offsets.data() + t * Height;
-    for (Eigen::Index q = 0; q < block.count; q += width) {
-      const float* const queries = block.queries + q * numbers;
-      V a[Height], b[Height];
-#pragma GCC unroll 16
-      for (int p = 0; p < Height; ++p) {
-        a[p] = b[p] = V{} + offsets[p];
-      }
-      for (Eigen::Index j = 0; j < numbers; ++j) {
-        V u, v;
-        load<Bytes>(queries + j * width, u);
-        load<Bytes>(queries + j * width + lanes, v);
-        const float* const y = points + j * Height;
-#pragma GCC unroll 16
-        for (int p = 0; p < Height; ++p) {
-          a[p] += y[p] * u;
-          b[p] += y[p] * v;
-        }
-      }
-      V most_a = a[0], most_b = b[0];
-#pragma GCC unroll 16
-      for (int p = 1; p < Height; ++p) {
-        most_a = a[p] > most_a ? a[p] : most_a;
-        most_b = b[p] > most_b ? b[p] : most_b;
-      }
-      float* const here = block.tile_best + t * block.count + q;
-      store<Bytes>(here, most_a);
-      store<Bytes>(here + lanes, most_b);
-      V best_a, best_b;
-      load<Bytes>(block.best + q, best_a);
-      load<Bytes>(block.best + q + lanes, best_b);
-      store<Bytes>(block.best + q, most_a > best_a ? most_a : best_a);
-      store<Bytes>(block.best + q + lanes, most_b > best_b ? most_b : best_b);
-    }
-  }
-}
-
-struct Kernel {
-  void (*score)(const Block&);
-  Eigen::Index width, height;  // queries and points at a time
-};
-SUPPLE_AVX512 void score_avx512(const Block& block) { score_body<64, 12>(block); }
-SUPPLE_AVX2 void score_avx2(const Block& block) { score_body<32, 6>(block); }
-void score_plain(const Block& block) { score_body<16, 6>(block); }
-
-Kernel kernel() {
-  switch (simd_level()) {
-    case SimdLevel::avx512:
-      return {score_avx512, 32, 12};
-    case SimdLevel::avx2:
-      return {score_avx2, 16, 6};
-    case SimdLevel::plain:
-      break;
-  }
-  return {score_plain, 8, 6};
-}
-
+// Points that lie close together share a tile, and so do queries. A tile of points is looked into
+// only where, by the distance to its middle and its radius, it may hold the nearest of some query
+// of a tile; the tiles that promise most come first.
 class Search {
  public:
   Search(const RowMatrix<double>& queries, const RowMatrix<double>& points, double scale)
-      : queries_(queries),
-        points_(points),
-        scale_(scale),
-        kernel_(kernel()),
-        tiles_(points, scale, kernel_.height) {
+      : query_rows_(queries),
+        point_rows_(points),
+        kernel_(nearest_kernel()),
+        first_(points.cols() >= kLong ? points.cols() / 3 : 0),
+        queries_(queries, grouped_rows(queries, kernel_.width), scale, kernel_.width, first_),
+        points_(points, grouped_rows(points, kernel_.height), scale, kernel_.height, first_),
+        middles_(points, points_, scale),
+        middle_tiles_(middles_.at, in_order(points_.count), scale, kernel_.height) {
     // Norms are at most 1. k + 1 products and sums, each operand rounded once before.
     const double rounding = static_cast<double>(points.cols() + 8) * 0x1.0p-23;
     slack_ = static_cast<float>(2.0 * rounding * 1.5);
   }
 
-  // The queries from `first`, kQueries of them or what is left.
-  void operator()(Eigen::Index first, Eigen::VectorXi& nearest) const {
-    const Eigen::Index rows = std::min(kQueries, queries_.rows() - first), k = queries_.cols();
-    const Eigen::Index width = kernel_.width, count = (rows + width - 1) / width * width;
-    std::vector<float> packed(static_cast<size_t>(count * k), 0.0F);
-    for (Eigen::Index i = 0; i < rows; ++i) {
-      float* const tile = packed.data() + i / width * width * k + i % width;
-      for (Eigen::Index j = 0; j < k; ++j) {
-        tile[j * width] = static_cast<float>(scale_ * queries_(first + i, j));
+  Eigen::Index groups() const { return queries_.count; }
+
+  // What a thread needs.
+  struct Room {
+    Eigen::ArrayXXf away;       // queries x tiles: square of the distance to the middle
+    Eigen::ArrayXXf tile_best;  // queries x tiles looked into: the best score there
+    Eigen::ArrayXXf scores;     // queries x points of these tiles
+    std::vector<unsigned char> within;
+    std::vector<int> ahead, looked_into;
+  };
+
+  // The queries of one group, a tile.
+  void operator()(Eigen::Index group, Room& room, Eigen::VectorXi& nearest) const {
+    const Eigen::Index width = kernel_.width;
+    room.away.resize(width, middle_tiles_.count * kernel_.height);
+    room.tile_best.resize(width, points_.count);
+    room.scores.resize(width, points_.count * kernel_.height);
+    room.within.resize(static_cast<size_t>(points_.count));
+    const Eigen::ArrayXf squares = squares_of(queries_.offsets, group);
+    const Eigen::ArrayXf first_squares = squares_of(queries_.first_offsets, group);
+    look_at_middles(group, squares, room);
+    Eigen::ArrayXf best = Eigen::ArrayXf::Constant(width, kNoScore);
+    Eigen::ArrayXf far = Eigen::ArrayXf::Constant(width, kFar), far_squares = far.square();
+    Eigen::ArrayXf enough = best;
+    const auto look_into = [&](int t) {
+      const auto place = static_cast<Eigen::Index>(room.looked_into.size());
+      if (!kernel_.score({queries_.tile(group), points_.tile(t), points_.offsets_of(t),
+                          points_.numbers, first_, points_.first_offsets_of(t), enough.data(),
+                          room.scores.col(place * kernel_.height).data(),
+                          room.tile_best.col(place).data()})) {
+        return;
+      }
+      room.looked_into.push_back(t);
+      if ((room.tile_best.col(place) > best).any()) {
+        best = best.max(room.tile_best.col(place));
+        far_squares = (squares - 2.0F * best).max(0.0F) + 4.0F * slack_;
+        far = far_squares.sqrt();
+        enough = 0.5F * (first_squares - far_squares);
+      }
+    };
+    room.looked_into.clear();
+    for (const int t : room.ahead) {
+      look_into(t);
+    }
+    kernel_.reach({room.away.data(), far.data(), far_squares.data(), middles_.radii.data(),
+                   points_.count, room.within.data()});
+    for (const int t : room.ahead) {
+      room.within[static_cast<size_t>(t)] = 0;
+    }
+    for (int t = 0; t < static_cast<int>(points_.count); ++t) {
+      if (room.within[static_cast<size_t>(t)] != 0) {
+        look_into(t);
       }
     }
-    std::vector<float> best(static_cast<size_t>(count), kNone);
-    std::vector<float> tile_best(static_cast<size_t>(count * tiles_.count));
-    kernel_.score({&tiles_, packed.data(), count, best.data(), tile_best.data()});
-    choose(first, rows, count, best, tile_best, nearest);
+    choose(group, best, room, nearest);
   }
 
  private:
-  // Compares the points of the tiles that may hold the nearest: those whose best score is at most
-  // `slack` below the best of all. In ascending order, so that the first of equals stays.
-  void choose(Eigen::Index first, Eigen::Index rows, Eigen::Index count,
-              const std::vector<float>& best, const std::vector<float>& tile_best,
+  // |x|^2 of a group's queries; 1 for those that fill the last one up.
+  Eigen::ArrayXf squares_of(const std::vector<float>& offsets, Eigen::Index group) const {
+    const Eigen::Index width = kernel_.width;
+    return -2.0F *
+           Eigen::Map<const Eigen::ArrayXf>(offsets.data() + group * width, width).max(-0.5F);
+  }
+
+  // How far each tile's middle is, and the tiles that come nearest to a query.
+  void look_at_middles(Eigen::Index group, const Eigen::ArrayXf& squares, Room& room) const {
+    const Eigen::Index height = kernel_.height;
+    Eigen::ArrayXf unused(kernel_.width);
+    std::vector<float> least(static_cast<size_t>(points_.count));
+    for (Eigen::Index t = 0; t < middle_tiles_.count; ++t) {
+      kernel_.score({queries_.tile(group), middle_tiles_.tile(t), middle_tiles_.offsets_of(t),
+                     points_.numbers, 0, nullptr, nullptr, room.away.col(t * height).data(),
+                     unused.data()});
+    }
+    for (Eigen::Index t = 0; t < points_.count; ++t) {
+      room.away.col(t) = squares - 2.0F * room.away.col(t) - 2.0F * slack_;
+      const float square = room.away.col(t).minCoeff();
+      least[static_cast<size_t>(t)] =
+          std::sqrt(std::max(square, 0.0F)) - middles_.radii[static_cast<size_t>(t)];
+    }
+    std::vector<int> tiles = in_order(points_.count);
+    const auto ahead = tiles.begin() + std::min<Eigen::Index>(kAhead, points_.count);
+    std::partial_sort(tiles.begin(), ahead, tiles.end(), [&](int a, int b) {
+      const float x = least[static_cast<size_t>(a)], y = least[static_cast<size_t>(b)];
+      return x < y || (x == y && a < b);
+    });
+    room.ahead.assign(tiles.begin(), ahead);
+  }
+
+  // Compares, in double precision, the points whose score is at most `slack` below the best.
+  void choose(Eigen::Index group, const Eigen::ArrayXf& best, const Room& room,
               Eigen::VectorXi& nearest) const {
-    std::vector<double> least(static_cast<size_t>(rows), std::numeric_limits<double>::infinity());
-    std::vector<float> most(static_cast<size_t>(count));
-    nearest.segment(first, rows).setZero();
-    for (Eigen::Index start = 0; start < tiles_.count; start += kTogether) {
-      const Eigen::Index end = std::min(tiles_.count, start + kTogether);
-      std::fill(most.begin(), most.end(), kNone);
-      for (Eigen::Index t = start; t < end; ++t) {
-        const float* const here = tile_best.data() + t * count;
-        for (Eigen::Index q = 0; q < count; ++q) {
-          most[static_cast<size_t>(q)] = std::max(most[static_cast<size_t>(q)], here[q]);
-        }
+    const Eigen::Index filled = queries_.filled(group);
+    std::vector<double> least(static_cast<size_t>(filled), std::numeric_limits<double>::infinity());
+    const int* const members = queries_.order.data() + group * kernel_.width;
+    for (Eigen::Index place = 0; place < static_cast<Eigen::Index>(room.looked_into.size());
+         ++place) {
+      if (((room.tile_best.col(place) - best).maxCoeff()) < -slack_) {
+        continue;
       }
-      for (Eigen::Index q = 0; q < rows; ++q) {
-        const float enough = best[static_cast<size_t>(q)] - slack_;
-        if (most[static_cast<size_t>(q)] < enough) {
+      const Eigen::Index t = room.looked_into[static_cast<size_t>(place)];
+      for (Eigen::Index q = 0; q < filled; ++q) {
+        const float enough = best[q] - slack_;
+        if (room.tile_best(q, place) < enough) {
           continue;
         }
-        for (Eigen::Index t = start; t < end; ++t) {
-          if (tile_best[static_cast<size_t>(t * count + q)] >= enough) {
-            compare(first + q, t, least[static_cast<size_t>(q)], nearest[first + q]);
+        for (Eigen::Index p = 0; p < points_.filled(t); ++p) {
+          if (room.scores(q, place * kernel_.height + p) >= enough) {
+            compare(members[q], points_.order[static_cast<size_t>(t * kernel_.height + p)],
+                    least[static_cast<size_t>(q)], nearest);
           }
         }
       }
     }
   }
 
-  void compare(Eigen::Index query, Eigen::Index tile, double& least, int& nearest) const {
-    const Eigen::Index begin = tile * tiles_.height;
-    const Eigen::Index end = std::min(points_.rows(), begin + tiles_.height);
-    for (Eigen::Index i = begin; i < end; ++i) {
-      const double away = (queries_.row(query) - points_.row(i)).squaredNorm();
-      if (away < least) {
-        least = away;
-        nearest = static_cast<int>(i);
-      }
+  void compare(int query, int point, double& least, Eigen::VectorXi& nearest) const {
+    const double away = (query_rows_.row(query) - point_rows_.row(point)).squaredNorm();
+    if (away < least || (away == least && point < nearest[query])) {
+      least = away;
+      nearest[query] = point;
     }
   }
 
-  const RowMatrix<double>& queries_;
-  const RowMatrix<double>& points_;
-  double scale_;
-  Kernel kernel_;
-  Tiles tiles_;
+  const RowMatrix<double>& query_rows_;
+  const RowMatrix<double>& point_rows_;
+  NearestKernel kernel_;
+  Eigen::Index first_;  // numbers that are looked at before the others; 0: all at once
+  RowTiles queries_, points_;
+  TileMiddles middles_;
+  RowTiles middle_tiles_;
   float slack_ = 0.0F;
 };
 
@@ -244,16 +212,21 @@ Eigen::VectorXi nearest_rows(const RowMatrix<double>& queries, const RowMatrix<d
   const double size = std::max(query_size, point_size);
   const Search search(queries, points, size > 0.0 ? 1.0 / size : 1.0);
   Eigen::VectorXi nearest(queries.rows());
-  const Eigen::Index blocks = (queries.rows() + kQueries - 1) / kQueries;
+  const Eigen::Index blocks = (search.groups() + kGroups - 1) / kGroups;
   const int threads = omp_in_parallel() ? 1 : omp_get_max_threads();
-  const Eigen::Index together = kBlocksBetweenReports * threads;
+  const Eigen::Index together = kTimesBetweenReports * threads;
+  std::vector<Search::Room> rooms(static_cast<size_t>(threads));
   for (Eigen::Index start = 0; start < blocks; start += together) {
     const Eigen::Index end = std::min(blocks, start + together);
     std::atomic<bool> no_memory{false};  // nothing may be thrown out of the loop
 #pragma omp parallel for schedule(dynamic, 1) num_threads(threads) if (threads > 1)
     for (Eigen::Index b = start; b < end; ++b) {
       try {
-        search(b * kQueries, nearest);
+        Search::Room& room = rooms[static_cast<size_t>(threads > 1 ? omp_get_thread_num() : 0)];
+        const Eigen::Index last = std::min(search.groups(), (b + 1) * kGroups);
+        for (Eigen::Index group = b * kGroups; group < last; ++group) {
+          search(group, room, nearest);
+        }
       } catch (const std::bad_alloc&) {
         no_memory = true;
       }

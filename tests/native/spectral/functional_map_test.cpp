@@ -74,6 +74,26 @@ TEST(NearestRows, AreThoseOfBruteForce) {
   }
 }
 
+TEST(NearestRows, AreThoseOfBruteForceWhereMostPointsAreFar) {
+  // Waves on a square, as eigenfunctions are: nearly all groups of points are passed over, by their
+  // middles or by the first of their numbers. Queries lie off the points, by nothing up to far.
+  const Eigen::Index count = 3000;
+  for (const Eigen::Index k : {10, 30, 47, 48, 90}) {
+    const RowMatrix<double> places = test::noise(2 * count, 2, 7);
+    RowMatrix<double> rows(places.rows(), k);
+    for (Eigen::Index j = 0; j < k; ++j) {
+      rows.col(j) = (places.col(0).array() * static_cast<double>(j % 9)).cos() *
+                    (places.col(1).array() * static_cast<double>(j / 9)).cos();
+    }
+    for (const double off : {0.0, 0.02, 0.3, 3.0}) {
+      const RowMatrix<double> queries = rows.topRows(count) + off * test::noise(count, k, 8);
+      RowMatrix<double> points = rows.bottomRows(count);
+      points.bottomRows(500) = points.topRows(500);  // twins: the first is meant
+      EXPECT_EQ(nearest_rows(queries, points), brute_force(queries, points)) << k << " " << off;
+    }
+  }
+}
+
 TEST(NearestRows, AreExactWhereSinglePrecisionCannotTell) {
   // Points far from 0 that differ in the twelfth digit; every query is one of them.
   RowMatrix<double> points = 1e-11 * test::noise(2000, 6, 1);
