@@ -10,6 +10,18 @@
 namespace supple::equivariant {
 namespace {
 
+// Faces and vertices whose data are asked for ahead: in meshes whose order is not one of
+// neighbours, each lies somewhere else in memory, and loops that only read would wait for it.
+constexpr Eigen::Index kAhead = 8;
+
+SUPPLE_INLINE void prefetch(const void* begin, size_t bytes) {
+  constexpr size_t kLine = 64;
+  const auto* const first = static_cast<const char*>(begin);
+  for (size_t i = 0; i < bytes; i += kLine) {
+    __builtin_prefetch(first + i);
+  }
+}
+
 template <class Scalar>
 struct Reference {
   Mat3<Scalar> matrix, defect;  // C, C C^T - I
@@ -20,7 +32,7 @@ struct Reference {
 
 // Y Y^T - I with Y = C + e.
 template <class Scalar>
-Mat3<Scalar> defect_of(const Reference<Scalar>& reference, const Mat3<Scalar>& e) {
+Mat3<Scalar> squared_of(const Reference<Scalar>& reference, const Mat3<Scalar>& e) {
   const Mat3<Scalar> mixed = reference.matrix * e.transpose();
   return reference.defect + mixed + mixed.transpose() + e * e.transpose();
 }
@@ -89,24 +101,20 @@ SUPPLE_INLINE void combine_body(const CombineTask<Scalar>& task) {
       square[5] += d * (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
     }
     Combination<Scalar>& out = task.out[r];
-    constexpr int kSymmetric[9] = {0, 1, 2, 1, 3, 4, 2, 4, 5};
+    for (Eigen::Index e = 0; e < kPadded; ++e) {
+      out.along[e] = along[e];
+      out.normal[e] = across[e];
+    }
     for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) {
+      for (int j = i; j < 3; ++j) {
+        const int k = kSymmetric[3 * i + j];
         Scalar mixed(0);
         for (int e = 0; e < 3; ++e) {
           mixed += task.reference[3 * i + e] * weighted[3 * j + e] +
                    weighted[3 * i + e] * task.reference[3 * j + e];
         }
-        out.defect[3 * i + j] =
-            total * task.defect[3 * i + j] + mixed + square[kSymmetric[3 * i + j]];
+        out.normal[kDefect + k] = total * task.defect[3 * i + j] + mixed + square[k];
       }
-    }
-    for (Eigen::Index e = 9; e < kPadded; ++e) {
-      out.defect[e] = Scalar(0);
-    }
-    for (Eigen::Index e = 0; e < kPadded; ++e) {
-      out.along[e] = along[e];
-      out.normal[e] = across[e];
     }
     out.along[kSum] = sum;
     out.along[kNormalSum] = normal_sum;
@@ -130,14 +138,22 @@ template <class Scalar>
 SUPPLE_INLINE void correct_body(const FaceTask<Scalar>& task, Eigen::Index begin,
                                 Eigen::Index end) {
   for (Eigen::Index f = begin; f < end; ++f) {
+    if (f + kAhead < end) {
+      for (int corner = 0; corner < 3; ++corner) {
+        prefetch(task.at_vertices + task.faces[3 * (f + kAhead) + corner],
+                 sizeof(Combination<Scalar>));
+      }
+    }
     const Combination<Scalar>& a = task.at_vertices[task.faces[3 * f]];
     const Combination<Scalar>& b = task.at_vertices[task.faces[3 * f + 1]];
     const Combination<Scalar>& c = task.at_vertices[task.faces[3 * f + 2]];
-    Scalar along[kPadded], across[kPadded], defect[kPadded];
+    Scalar along[kPadded], across[kPadded], defect[9];
     for (Eigen::Index e = 0; e < kPadded; ++e) {
       along[e] = (a.along[e] + b.along[e] + c.along[e]) * Scalar(1.0 / 3.0);
       across[e] = (a.normal[e] + b.normal[e] + c.normal[e]) * Scalar(1.0 / 3.0);
-      defect[e] = (a.defect[e] + b.defect[e] + c.defect[e]) * Scalar(1.0 / 3.0);
+    }
+    for (int e = 0; e < 9; ++e) {
+      defect[e] = across[kDefect + kSymmetric[e]];
     }
     const double *const lead = task.lead + 9 * f, *const first = task.first + 9 * f;
     Scalar whole[9], bent[9], correction[9];
@@ -200,8 +216,7 @@ void combine_backward(const Bands<Scalar>& bands, Eigen::Index r,
       out[layout.smooth(i, s) + 1] =
           smooth.cwiseProduct(matrix_of(grad.normal)).sum() + grad.along[kNormalSum];
       if (i == layout.fields - 1) {
-        out[layout.defect(s)] =
-            defect_of(reference, smooth).cwiseProduct(matrix_of(grad.defect)).sum();
+        out[layout.defect(s)] = squared_of(reference, smooth).cwiseProduct(defect_of(grad)).sum();
       }
     }
   }
@@ -229,6 +244,16 @@ Face<Scalar> face_at(const Fields<Scalar>& fields, Eigen::Index f) {
   return face;
 }
 
+// The matrices that `vertex_average` reads.
+void prefetch_around(const SurfaceOperators& operators, const Signal& signal, Eigen::Index v) {
+  const int* const first = operators.average.outerIndexPtr() + v;
+  for (const MatrixField& field : signal.fields) {
+    for (int i = first[0]; i < first[1]; ++i) {
+      prefetch(field.data() + 9 * operators.average.innerIndexPtr()[i], 9 * sizeof(double));
+    }
+  }
+}
+
 }  // namespace
 
 template <class Scalar>
@@ -246,6 +271,9 @@ Fields<Scalar> project_fields(const NetworkContext<Scalar>& context, const Signa
   RowMatrix<Scalar> weighted(n, kPadded * count);
 #pragma omp parallel for schedule(static)
   for (Eigen::Index v = 0; v < n; ++v) {
+    if (v + kAhead < n) {
+      prefetch_around(operators, signal, v + kAhead);
+    }
     weighted.row(v).setZero();
     for (Eigen::Index i = 0; i < count; ++i) {
       const Eigen::Matrix<double, 1, 9> mean =
@@ -375,7 +403,12 @@ Combinations<Scalar> combinations_backward(const Fields<Scalar>& fields, const M
     c = {};
     Eigen::Map<Mat3<Scalar>>(c.along) = g;
     Eigen::Map<Mat3<Scalar>>(c.normal) = normal;
-    Eigen::Map<Mat3<Scalar>>(c.defect) = g * face.whole_lead.transpose();
+    const Mat3<Scalar> defect = g * face.whole_lead.transpose();
+    for (int i = 0; i < 3; ++i) {
+      for (int j = i; j < 3; ++j) {
+        c.normal[kDefect + kSymmetric[3 * i + j]] = Scalar(0.5) * (defect(i, j) + defect(j, i));
+      }
+    }
     c.along[kSum] = -g.cwiseProduct(face.lead).sum();
     c.along[kNormalSum] = -normal.cwiseProduct(face.lead).sum();
     c.along[kFirst] = g.cwiseProduct(face.first).sum();

@@ -37,13 +37,25 @@ struct Layout {
 ///   E = sum c (Y - C), F = sum c' (Y - C), D = sum c'' (Y Y^T - I)
 /// and the sums of c, of c', and the coefficients of X_0 (two fields), so that
 ///   J - L = E - e (L - C) + P (F - f (L - C)) + D L + x (X_0 - L) + x' P (X_0 - L).
+/// Two lines of the cache in single precision: faces read three of these each.
 template <class Scalar>
 struct Combination {
   Scalar along[kPadded];   // E; then e, f, x, x' at 9..12
-  Scalar normal[kPadded];  // F
-  Scalar defect[kPadded];  // D
+  Scalar normal[kPadded];  // F; then D, which is symmetric, at 9..14
 };
-enum Place { kSum = 9, kNormalSum = 10, kFirst = 11, kNormalFirst = 12 };
+enum Place { kSum = 9, kNormalSum = 10, kFirst = 11, kNormalFirst = 12, kDefect = 9 };
+/// Where each of a symmetric matrix's nine numbers is among six.
+constexpr int kSymmetric[9] = {0, 1, 2, 1, 3, 4, 2, 4, 5};
+
+/// D of a combination; of a gradient, the symmetric part of that with respect to D.
+template <class Scalar>
+Mat3<Scalar> defect_of(const Combination<Scalar>& combination) {
+  Mat3<Scalar> result;
+  for (int e = 0; e < 9; ++e) {
+    result.data()[e] = combination.normal[kDefect + kSymmetric[e]];
+  }
+  return result;
+}
 
 /// The fields' parts in each band of eigenfunctions between two scales, for some vertices: rows x
 /// (fields * 16) a band.
@@ -130,7 +142,6 @@ Combination<Scalar> gathered(const SurfaceOperators& operators,
     for (Eigen::Index e = 0; e < kPadded; ++e) {
       sum.along[e] += at.along[e];
       sum.normal[e] += at.normal[e];
-      sum.defect[e] += at.defect[e];
     }
   }
   return sum;

@@ -143,8 +143,7 @@ class SignalGradient {
               RowMatrix<Scalar>::Zero(rows, kScaleCount * kPadded * count_);
           for (Eigen::Index r = 0; r < rows; ++r) {
             const Combination<Scalar> sum = gathered(operators_, at_faces, first + r);
-            const Mat3<Scalar> defect = matrix_of(sum.defect);
-            const Mat3<Scalar> symmetric = defect + defect.transpose();
+            const Mat3<Scalar> symmetric = Scalar(2) * defect_of(sum);
             for (int i = 0; i < count_; ++i) {
               std::array<Mat3<Scalar>, kScaleCount> scales;
               Mat3<Scalar> smooth = reference;
@@ -183,7 +182,7 @@ class SignalGradient {
         double sum = 0.0, normal_sum = 0.0, along_first = 0.0, normal_first = 0.0;
         for (int c = 0; c < 3; ++c) {
           const auto& corner = at_vertices[static_cast<size_t>(operators_.faces(f, c))];
-          defect += matrix_of(corner.defect).template cast<double>() / 3.0;
+          defect += defect_of(corner).template cast<double>() / 3.0;
           sum += corner.along[kSum] / 3.0;
           normal_sum += corner.along[kNormalSum] / 3.0;
           along_first += corner.along[kFirst] / 3.0;
