@@ -16,6 +16,7 @@
 #include "row_groups.h"
 #include "row_tiles.h"
 #include "supple/core/error.h"
+#include "supple/core/parallel.h"
 
 namespace supple {
 namespace {
@@ -40,15 +41,20 @@ std::vector<int> in_order(Eigen::Index count) {
 // of a tile; the tiles that promise most come first.
 class Search {
  public:
-  Search(const RowMatrix<double>& queries, const RowMatrix<double>& points, double scale)
+  Search(const ConstTallBlock<double>& queries, const ConstTallBlock<double>& points, double scale)
       : query_rows_(queries),
         point_rows_(points),
         kernel_(nearest_kernel()),
-        first_(points.cols() >= kLong ? points.cols() / 3 : 0),
-        queries_(queries, grouped_rows(queries, kernel_.width), scale, kernel_.width, first_),
-        points_(points, grouped_rows(points, kernel_.height), scale, kernel_.height, first_),
-        middles_(points, points_, scale),
-        middle_tiles_(middles_.at, in_order(points_.count), scale, kernel_.height) {
+        first_(points.cols() >= kLong ? points.cols() / 3 : 0) {
+    run_at_once(2, [&](size_t side) {
+      if (side == 0) {
+        queries_ = {queries, grouped_rows(queries, kernel_.width), scale, kernel_.width, first_};
+        return;
+      }
+      points_ = {points, grouped_rows(points, kernel_.height), scale, kernel_.height, first_};
+      middles_ = {points, points_, scale};
+      middle_tiles_ = {middles_.at, in_order(points_.count), scale, kernel_.height};
+    });
     // Norms are at most 1. k + 1 products and sums, each operand rounded once before.
     const double rounding = static_cast<double>(points.cols() + 8) * 0x1.0p-23;
     slack_ = static_cast<float>(2.0 * rounding * 1.5);
@@ -179,8 +185,8 @@ class Search {
     }
   }
 
-  const RowMatrix<double>& query_rows_;
-  const RowMatrix<double>& point_rows_;
+  const ConstTallBlock<double>& query_rows_;
+  const ConstTallBlock<double>& point_rows_;
   NearestKernel kernel_;
   Eigen::Index first_;  // numbers that are looked at before the others; 0: all at once
   RowTiles queries_, points_;
@@ -189,21 +195,25 @@ class Search {
   float slack_ = 0.0F;
 };
 
-double largest_norm(const RowMatrix<double>& rows) {
-  return rows.size() == 0 ? 0.0 : rows.rowwise().norm().maxCoeff<Eigen::PropagateNaN>();
+double largest_norm(const ConstTallBlock<double>& rows) {
+  return rows.size() == 0 ? 0.0
+                          : std::sqrt(rows.rowwise().squaredNorm().maxCoeff<Eigen::PropagateNaN>());
 }
 
 }  // namespace
 
-Eigen::VectorXi nearest_rows(const RowMatrix<double>& queries, const RowMatrix<double>& points,
-                             ProgressRange progress) {
+Eigen::VectorXi nearest_rows(const ConstTallBlock<double>& queries,
+                             const ConstTallBlock<double>& points, ProgressRange progress) {
   if (queries.cols() != points.cols() || points.rows() == 0) {
     throw Error(ErrorCode::wrong_shape,
                 "The nearest of " + std::to_string(points.rows()) + " rows of " +
                     std::to_string(points.cols()) + " numbers is looked for, to rows of " +
                     std::to_string(queries.cols()) + "; there must be one, of as many.");
   }
-  const double query_size = largest_norm(queries), point_size = largest_norm(points);
+  double query_size = 0.0, point_size = 0.0;
+  run_at_once(2, [&](size_t side) {
+    side == 0 ? query_size = largest_norm(queries) : point_size = largest_norm(points);
+  });
   if (!std::isfinite(query_size) || !std::isfinite(point_size)) {
     throw Error(ErrorCode::not_finite,
                 "The rows to compare hold NaN or infinity. Check the functions and the map.");

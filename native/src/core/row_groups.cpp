@@ -40,7 +40,7 @@ struct Halving {
 
 }  // namespace
 
-std::vector<int> grouped_rows(const RowMatrix<double>& rows, Eigen::Index size) {
+std::vector<int> grouped_rows(const ConstTallBlock<double>& rows, Eigen::Index size) {
   std::vector<int> order(static_cast<size_t>(rows.rows()));
   std::iota(order.begin(), order.end(), 0);
   const Eigen::Index numbers = std::min(kNumbers, rows.cols());

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "supple/core/tall.h"
 #include "supple/core/types.h"
 
 namespace supple {
@@ -12,6 +13,6 @@ namespace supple {
 /// close together: halved again and again along the number that differs most. Numbers further to
 /// the right count less, as eigenfunctions oscillate faster the later they come. Finite rows; size
 /// >= 1.
-std::vector<int> grouped_rows(const RowMatrix<double>& rows, Eigen::Index size);
+std::vector<int> grouped_rows(const ConstTallBlock<double>& rows, Eigen::Index size);
 
 }  // namespace supple

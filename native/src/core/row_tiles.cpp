@@ -6,7 +6,7 @@
 
 namespace supple {
 
-RowTiles::RowTiles(const RowMatrix<double>& rows_in, std::vector<int> order_in, double scale,
+RowTiles::RowTiles(const ConstTallBlock<double>& rows_in, std::vector<int> order_in, double scale,
                    Eigen::Index height_in, Eigen::Index first)
     : height(height_in),
       numbers(rows_in.cols()),
@@ -28,7 +28,7 @@ RowTiles::RowTiles(const RowMatrix<double>& rows_in, std::vector<int> order_in, 
   }
 }
 
-TileMiddles::TileMiddles(const RowMatrix<double>& rows, const RowTiles& tiles, double scale)
+TileMiddles::TileMiddles(const ConstTallBlock<double>& rows, const RowTiles& tiles, double scale)
     : at(tiles.count, tiles.numbers), radii(static_cast<size_t>(tiles.count)) {
   for (Eigen::Index t = 0; t < tiles.count; ++t) {
     at.row(t).setZero();

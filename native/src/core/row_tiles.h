@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "supple/core/tall.h"
 #include "supple/core/types.h"
 
 namespace supple {
@@ -15,7 +16,8 @@ inline constexpr float kNoScore = -std::numeric_limits<float>::max();  // less t
 // Rows in tiles of so many that lie close together: within one, number by number (count x height),
 // so that a kernel reads them one after the other.
 struct RowTiles {
-  RowTiles(const RowMatrix<double>& rows_in, std::vector<int> order_in, double scale,
+  RowTiles() = default;
+  RowTiles(const ConstTallBlock<double>& rows_in, std::vector<int> order_in, double scale,
            Eigen::Index height_in, Eigen::Index first = 0);
 
   const float* tile(Eigen::Index t) const { return values.data() + t * height * numbers; }
@@ -24,7 +26,7 @@ struct RowTiles {
   // Rows in tile t.
   Eigen::Index filled(Eigen::Index t) const { return std::min(height, rows - t * height); }
 
-  Eigen::Index height, numbers, rows, count;
+  Eigen::Index height = 0, numbers = 0, rows = 0, count = 0;
   std::vector<int> order;            // the row at each place
   std::vector<float> values;         // zeros fill the last tile up
   std::vector<float> offsets;        // -|y|^2 / 2; kNoScore fills the last tile up
@@ -33,7 +35,8 @@ struct RowTiles {
 
 // The middles of tiles, and how far a tile's rows are from theirs at most.
 struct TileMiddles {
-  TileMiddles(const RowMatrix<double>& rows, const RowTiles& tiles, double scale);
+  TileMiddles() = default;
+  TileMiddles(const ConstTallBlock<double>& rows, const RowTiles& tiles, double scale);
 
   RowMatrix<double> at;
   std::vector<float> radii;

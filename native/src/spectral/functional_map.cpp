@@ -82,6 +82,7 @@ RowMatrix<double> functional_map(const Eigenbasis& source, const Eigenbasis& tar
   check_map(source, target, point_map);
   RowMatrix<double> pulled(point_map.size(), target_count);
   const double scale = std::sqrt(target.mass.sum() / source.mass.sum());
+#pragma omp parallel for schedule(static)
   for (Eigen::Index i = 0; i < point_map.size(); ++i) {
     pulled.row(i) = scale * source.mass[i] * target.functions.row(point_map[i]).head(target_count);
   }
@@ -94,9 +95,10 @@ Eigen::VectorXi point_map(const Eigenbasis& source, const Eigenbasis& target,
   check_basis("target", target);
   check_count("source", source, map.rows());
   check_count("target", target, map.cols());
-  const RowMatrix<double> moved =
-      product(unit_functions(target, map.cols()), Op::none, map, Op::transpose);
-  return nearest_rows(unit_functions(source, map.rows()), moved, progress);
+  const double scale = std::sqrt(target.mass.sum() / source.mass.sum());
+  RowMatrix<double> moved = RowMatrix<double>::Zero(target.functions.rows(), map.rows());
+  add_tall_product<double>(scale, {target.functions.leftCols(map.cols())}, map.transpose(), moved);
+  return nearest_rows(source.functions.leftCols(map.rows()), moved, progress);
 }
 
 Zoomout zoomout(const Eigenbasis& source, const Eigenbasis& target, const Eigen::VectorXi& initial,

@@ -100,9 +100,9 @@ SampledFunctions sampled_functions(const Eigenbasis& basis, const Eigen::VectorX
 
 Eigen::VectorXi sampled_point_map(const SampledFunctions& source, const SampledFunctions& target,
                                   const RowMatrix<double>& map) {
-  const RowMatrix<double> own = target.functions.leftCols(map.cols());
-  return nearest_rows(source.functions.leftCols(map.rows()),
-                      product(own, Op::none, map, Op::transpose));
+  RowMatrix<double> moved = RowMatrix<double>::Zero(target.functions.rows(), map.rows());
+  add_tall_product<double>(1.0, {target.functions.leftCols(map.cols())}, map.transpose(), moved);
+  return nearest_rows(source.functions.leftCols(map.rows()), moved);
 }
 
 RowMatrix<double> sampled_functional_map(const SampledFunctions& source,

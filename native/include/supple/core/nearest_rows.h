@@ -3,6 +3,7 @@
 #pragma once
 
 #include "supple/core/progress.h"
+#include "supple/core/tall.h"
 #include "supple/core/types.h"
 
 namespace supple {
@@ -14,7 +15,7 @@ namespace supple {
 /// first numbers vary slowest from row to row, as those of eigenfunctions do. Memory: both once
 /// more in single precision, and some 40 p floats a thread. Errors: `wrong_shape`, `not_finite`;
 /// `cancelled`.
-Eigen::VectorXi nearest_rows(const RowMatrix<double>& queries, const RowMatrix<double>& points,
-                             ProgressRange progress = {});
+Eigen::VectorXi nearest_rows(const ConstTallBlock<double>& queries,
+                             const ConstTallBlock<double>& points, ProgressRange progress = {});
 
 }  // namespace supple
