@@ -115,6 +115,12 @@ SUPPLE_INLINE void transpose_product_body(const Scalar* a, Eigen::Index a_stride
       transpose_columns<Bytes, Width, S::vectors, S::together>(a + j, a_stride, b + part, rows,
                                                                sums + j * Width + part);
     }
+    // A piece may be narrower than that; one column after the other, each sum waits for itself.
+    constexpr int kFewer = S::together / 2;
+    for (; j + kFewer <= k; j += kFewer) {
+      transpose_columns<Bytes, Width, S::vectors, kFewer>(a + j, a_stride, b + part, rows,
+                                                          sums + j * Width + part);
+    }
     for (; j < k; ++j) {
       transpose_columns<Bytes, Width, S::vectors, 1>(a + j, a_stride, b + part, rows,
                                                      sums + j * Width + part);
