@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "supple/geometry/surface_operators.h"
 
+#include <algorithm>
+
+#include "corner_forces.h"
 #include "neighbours.h"
 #include "supple/geometry/jacobians.h"
 #include "supple/geometry/operators.h"
@@ -56,21 +59,13 @@ MatrixField SurfaceOperators::jacobians_of(const Points& moved) const {
 }
 
 Points SurfaceOperators::divergence_of(const MatrixField& jacobians) const {
-  Points result(vertices.rows(), 3);
+  CornerForces forces(*this);
+  constexpr Eigen::Index kFaces = 512;
 #pragma omp parallel for schedule(static)
-  for (Eigen::Index v = 0; v < result.rows(); ++v) {
-    Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
-    for (int i = corners.first[v]; i < corners.first[v + 1]; ++i) {
-      const int f = corners.corner[i] / 3, c = corners.corner[i] - 3 * f;
-      // Columns 0 and 1 of E^-1 are the gradients of the functions that are 1 at corners 1 and 2.
-      const auto inverse = matrix_at(inverse_frames, f);
-      const Eigen::Vector3d gradient =
-          c == 0 ? Eigen::Vector3d(-inverse.col(0) - inverse.col(1)) : inverse.col(c - 1).eval();
-      sum.noalias() += (face_areas[f] * gradient).transpose() * matrix_at(jacobians, f);
-    }
-    result.row(v) = sum;
+  for (Eigen::Index first = 0; first < faces.rows(); first += kFaces) {
+    forces.set(first, std::min(kFaces, faces.rows() - first), jacobians.row(first).data());
   }
-  return result;
+  return forces.gathered();
 }
 
 MatrixField SurfaceOperators::divergence_backward(const Points& grad) const {

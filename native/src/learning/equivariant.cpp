@@ -4,23 +4,12 @@
 #include <Eigen/LU>
 #include <algorithm>
 
+#include "core/prefetch.h"
 #include "equivariant_parts.h"
 #include "supple/core/simd.h"
 
 namespace supple::equivariant {
 namespace {
-
-// Faces and vertices whose data are asked for ahead: in meshes whose order is not one of
-// neighbours, each lies somewhere else in memory, and loops that only read would wait for it.
-constexpr Eigen::Index kAhead = 8;
-
-SUPPLE_INLINE void prefetch(const void* begin, size_t bytes) {
-  constexpr size_t kLine = 64;
-  const auto* const first = static_cast<const char*>(begin);
-  for (size_t i = 0; i < bytes; i += kLine) {
-    __builtin_prefetch(first + i);
-  }
-}
 
 template <class Scalar>
 struct Reference {

@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
+#include "core/prefetch.h"
+#include "geometry/corner_forces.h"
 #include "supple/geometry/jacobians.h"
 
 namespace supple {
@@ -28,8 +30,14 @@ void for_each_chunk(Eigen::Index faces, const Visit& visit) {
 
 void jacobians_of(const SurfaceOperators& operators, const Points& moved, Eigen::Index first,
                   Eigen::Index count, Chunk& jacobians) {
+  const Faces& faces = operators.faces;
   for (Eigen::Index i = 0; i < count; ++i) {
-    const auto face = operators.faces.row(first + i);
+    if (first + i + kAhead < faces.rows()) {
+      for (int c = 0; c < 3; ++c) {
+        prefetch(moved.data() + 3 * faces(first + i + kAhead, c), 3 * sizeof(double));
+      }
+    }
+    const auto face = faces.row(first + i);
     const Eigen::RowVector3d origin = moved.row(face[0]);
     const Eigen::RowVector3d e1 = moved.row(face[1]) - origin, e2 = moved.row(face[2]) - origin;
     Eigen::RowVector3d normal = e1.cross(e2);
@@ -54,11 +62,10 @@ void rotations_past(const MatrixField& stretch, Eigen::Index first, Eigen::Index
 
 // Sets rows of `away` to targets - jacobians. Rotations come in single precision; what differs no
 // more than their rounding counts as reached, so that a rigid motion stays one exactly.
-void difference(const Chunk& targets, const Chunk& jacobians, Eigen::Index first,
-                Eigen::Index count, MatrixField& away) {
+void difference(const Chunk& targets, const Chunk& jacobians, Eigen::Index count, Chunk& away) {
   constexpr double kRounding = 1e-6;
   for (Eigen::Index i = 0; i < count; ++i) {
-    auto row = away.row(first + i);
+    auto row = away.row(i);
     row = targets.row(i) - jacobians.row(i);
     if (row.squaredNorm() < kRounding * kRounding) {
       row.setZero();
@@ -69,25 +76,27 @@ void difference(const Chunk& targets, const Chunk& jacobians, Eigen::Index first
 }  // namespace
 
 Points towards(const SurfaceOperators& operators, const Points& moved, const MatrixField& targets) {
-  MatrixField away(targets.rows(), 9);
-  for_each_chunk(away.rows(), [&](Eigen::Index first, Eigen::Index count) {
-    Chunk j, target;
+  CornerForces forces(operators);
+  for_each_chunk(operators.faces.rows(), [&](Eigen::Index first, Eigen::Index count) {
+    Chunk j, target, away;
     jacobians_of(operators, moved, first, count, j);
     target.topRows(count) = targets.middleRows(first, count);
-    difference(target, j, first, count, away);
+    difference(target, j, count, away);
+    forces.set(first, count, away.data());
   });
-  return operators.divergence_of(away);
+  return forces.gathered();
 }
 
 Points towards_rotations(const SurfaceOperators& operators, const Points& moved) {
-  MatrixField away(operators.faces.rows(), 9);
-  for_each_chunk(away.rows(), [&](Eigen::Index first, Eigen::Index count) {
-    Chunk j, q;
+  CornerForces forces(operators);
+  for_each_chunk(operators.faces.rows(), [&](Eigen::Index first, Eigen::Index count) {
+    Chunk j, q, away;
     jacobians_of(operators, moved, first, count, j);
     closest_rotations(j.data(), q.data(), count, Precision::single);
-    difference(q, j, first, count, away);
+    difference(q, j, count, away);
+    forces.set(first, count, away.data());
   });
-  return operators.divergence_of(away);
+  return forces.gathered();
 }
 
 MatrixField rotations_of(const SurfaceOperators& operators, const Points& moved) {
@@ -120,17 +129,18 @@ void follow(const MatrixField& start, MatrixField& field) {
 
 Points towards_stretched(const SurfaceOperators& operators, const Points& moved,
                          const MatrixField& stretch) {
-  MatrixField away(stretch.rows(), 9);
-  for_each_chunk(away.rows(), [&](Eigen::Index first, Eigen::Index count) {
-    Chunk j, turned, q;
+  CornerForces forces(operators);
+  for_each_chunk(operators.faces.rows(), [&](Eigen::Index first, Eigen::Index count) {
+    Chunk j, turned, q, away;
     jacobians_of(operators, moved, first, count, j);
     rotations_past(stretch, first, count, j, q.data());
     for (Eigen::Index i = 0; i < count; ++i) {
       matrix_of(turned, i).noalias() = matrix_at(stretch, first + i) * matrix_of(q, i);
     }
-    difference(turned, j, first, count, away);
+    difference(turned, j, count, away);
+    forces.set(first, count, away.data());
   });
-  return operators.divergence_of(away);
+  return forces.gathered();
 }
 
 void bound_stretch(double share, double most, MatrixField& predicted, MatrixField& stretch) {

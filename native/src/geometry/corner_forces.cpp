@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "corner_forces.h"
+
+#include "core/prefetch.h"
+
+namespace supple {
+
+CornerForces::CornerForces(const SurfaceOperators& operators)
+    : operators_(operators),
+      forces_(
+          std::make_unique_for_overwrite<Force[]>(static_cast<size_t>(operators.faces.rows()))) {}
+
+void CornerForces::set(Eigen::Index first, Eigen::Index count, const double* matrices) {
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const double* const x = matrices + 9 * i;
+    // Columns 0 and 1 of E^-1 are the gradients of the functions that are 1 at corners 1 and 2.
+    const double* const inverse = operators_.inverse_frames.data() + 9 * (first + i);
+    const double area = operators_.face_areas[first + i];
+    Force& force = forces_[static_cast<size_t>(first + i)];
+    for (int j = 0; j < 3; ++j) {
+      force.one[j] = area * (inverse[0] * x[j] + inverse[3] * x[3 + j] + inverse[6] * x[6 + j]);
+      force.two[j] = area * (inverse[1] * x[j] + inverse[4] * x[3 + j] + inverse[7] * x[6 + j]);
+    }
+  }
+}
+
+Points CornerForces::gathered() const {
+  const CornerTable& corners = operators_.corners;
+  Points result(operators_.vertices.rows(), 3);
+  const Eigen::Index n = result.rows();
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index v = 0; v < n; ++v) {
+    if (v + kAhead < n) {
+      for (int i = corners.first[v + kAhead]; i < corners.first[v + kAhead + 1]; ++i) {
+        prefetch(&forces_[static_cast<size_t>(corners.corner[i] / 3)], sizeof(Force));
+      }
+    }
+    double sum[3] = {};
+    for (int i = corners.first[v]; i < corners.first[v + 1]; ++i) {
+      const int f = corners.corner[i] / 3, c = corners.corner[i] - 3 * f;
+      const Force& force = forces_[static_cast<size_t>(f)];
+      for (int j = 0; j < 3; ++j) {
+        sum[j] += c == 0 ? -force.one[j] - force.two[j] : c == 1 ? force.one[j] : force.two[j];
+      }
+    }
+    result.row(v) = Eigen::Map<const Eigen::RowVector3d>(sum);
+  }
+  return result;
+}
+
+}  // namespace supple
