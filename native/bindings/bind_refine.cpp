@@ -41,6 +41,7 @@ void bind_refine(py::module_& module) {
       .def_readonly("rounds", &RefineReport::rounds)
       .def_readonly("eigenfunctions", &RefineReport::eigenfunctions)
       .def_readonly("network", &RefineReport::network)
+      .def_readonly("bounded_faces", &RefineReport::bounded_faces)
       .def_readonly("signal_milliseconds", &RefineReport::signal_milliseconds)
       .def_readonly("network_milliseconds", &RefineReport::network_milliseconds)
       .def_readonly("recovery_milliseconds", &RefineReport::recovery_milliseconds)

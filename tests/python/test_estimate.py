@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import supple
 from supple import SuppleError
-from supple.cases import read_mesh, write_mesh
 from supple.cli import app
+from supple.mesh_files import read_mesh, write_mesh
 from supple_training.compare import shapes
 from typer.testing import CliRunner
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import supple
 from supple import SuppleError, evaluation, match_sets
-from supple.cases import write_mesh
 from supple.cli import app
+from supple.mesh_files import write_mesh
 from supple_training.compare import shapes
 from typer.testing import CliRunner
 
@@ -155,8 +155,8 @@ def error_of(folder, out):
     return supple.geodesic_errors(mesh, b.template, found[a.template])[0].mean
 
 
-def test_refine_from_a_map_and_from_nearest_points(folder, tmp_path):
-    for options in (["--map", folder / "init" / "a__b.map"], ["--start", "nearest"]):
+def test_refine_from_a_map_and_from_aligned_points(folder, tmp_path):
+    for options in (["--map", folder / "init" / "a__b.map"], ["--start", "aligned"]):
         result, out = refined(folder, tmp_path, *options)
         assert result.exit_code == 0, (result.output, result.exc_info)
         assert len(out.read_text().split()) == N

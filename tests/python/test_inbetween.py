@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import supple
 from supple import Handle, SuppleError
-from supple.cases import read_mesh
+from supple.mesh_files import read_mesh
 
 HUMAN = Path(__file__).resolve().parents[2] / "samples" / "human"
 SHOULDER = np.array([-0.17, 1.5, 0.0])

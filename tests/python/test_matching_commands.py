@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 import supple
 from supple import evaluation
-from supple.cases import read_mesh, write_mesh
 from supple.cli import app
 from supple.cli.console import watched
 from supple.match_sets import read_match_set
+from supple.mesh_files import read_mesh, write_mesh
 from typer.testing import CliRunner
 
 SIZE = 300
@@ -184,7 +184,7 @@ def test_unknown_losses_are_named(folder):
     model = ["--model", folder / "features.safetensors"]
     result = run("evaluate", "match", folder, *model, "--configs", "ljn,magic")
     assert result.exit_code == 1
-    assert "'magic' is no configuration" in " ".join(result.output.split())
+    assert "'magic' is no way to match" in " ".join(result.output.split())
 
 
 def test_ctrl_c_cancels_and_waits_for_what_was_started():

@@ -80,6 +80,32 @@ def test_network_refines_maps_better_than_the_identity(pairs):
     assert np.all(network[:, 1] > initial[:, 1]), rows
 
 
+def test_torn_maps_do_not_run_away():
+    """An arm that goes to the other end of the body. The network knows nothing of faces that are
+    stretched so far; without a bound the body became a thousand times as large."""
+    with np.load(FIXTURE) as data:
+        source, target, faces = (data[f"{name}2"].astype(np.float64) for name in "stf")
+    faces = faces.astype(np.int32)
+    torn = rough_map(target, faces, 2)
+    size = np.ptp(target, axis=0)
+    long, side = np.argmax(size), np.argsort(size)[1]
+    arm = target[:, side] > np.quantile(target[:, side], 0.85)
+    image = target[arm].copy()
+    image[:, long] = target[:, long].min() + image[:, side] - image[:, side].min()
+    torn[arm] = nearest(image, target)
+    from_, to = (supple.PreparedMesh(v, faces, cache=False) for v in (source, target))
+    counts = (80, 100, 120, 120, 120, 120)
+    plain, got = (
+        supple.Refiner(from_, to, model=model, counts=counts).refine(torn)
+        for model in (None, "spectral")
+    )
+    assert plain.report["bounded_faces"] == 0
+    assert 0 < got.report["bounded_faces"] < 0.2 * len(faces)
+    assert np.ptp(got.recovered, axis=0).max() < 1.2 * size.max()
+    energies = [supple.map_dirichlet(from_, to, result.point_map) for result in (plain, got)]
+    assert energies[1] < energies[0]
+
+
 def test_result_has_every_part(pairs):
     source, faces, target, from_, to, rough = pairs[0]
     result = supple.Refiner(from_, to, counts=[60], backward=True).refine(rough)

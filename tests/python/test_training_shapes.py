@@ -13,9 +13,9 @@ pytest.importorskip("igl", reason="libigl is not installed; pip install ./traini
 
 from scipy.stats import spearmanr
 from supple import Mesh
-from supple.cases import read_mesh
 from supple.map_metrics import flipped
 from supple.match_sets import read_match_set
+from supple.mesh_files import read_mesh
 from supple_training import bodies, creatures, match_cases, shapes
 from supple_training.compare.shapes import bumpy_torus
 from supple_training.creatures.families import FAMILIES

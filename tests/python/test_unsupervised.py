@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import supple
 from supple import SuppleError, unsupervised
-from supple.cases import write_mesh
 from supple.cli import app
+from supple.mesh_files import write_mesh
 from supple.shape_folders import read_shapes, shuffled
 from typer.testing import CliRunner
 

@@ -18,7 +18,7 @@ import numpy as np
 import supple
 import typer
 from numpy.typing import NDArray
-from supple.cases import write_mesh
+from supple.mesh_files import write_mesh
 
 from supple_training import bodies, tubes
 from supple_training.console import console

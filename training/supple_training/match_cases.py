@@ -20,7 +20,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
-from supple.cases import write_mesh
+from supple.mesh_files import write_mesh
 
 from supple_training import bodies, creatures
 from supple_training.console import console, progress_bar

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import meshio
 import numpy as np
 from numpy.typing import NDArray
 
 from .editing import Handle
 from .errors import SuppleError
+from .mesh_files import read_mesh
 
 
 @dataclass
@@ -56,33 +56,6 @@ def read_case(folder: str | os.PathLike) -> EditCase:
                 "must be the same vertices.",
             )
     return EditCase(folder.resolve().name, vertices, faces, handles, truth)
-
-
-def read_mesh(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """(n, 3) vertices in file order and (m, 3) triangles of any format meshio reads.
-
-    Raises:
-        SuppleError: bad_case.
-    """
-    if not path.is_file():
-        raise SuppleError("bad_case", f"There is no file {path}.")
-    try:
-        mesh = meshio.read(path)
-    except (meshio.ReadError, ValueError, IndexError, SystemExit) as error:
-        raise SuppleError("bad_case", f"{path} cannot be read as a mesh: {error}.") from error
-    triangles = [
-        np.stack([block.data[:, 0], block.data[:, i], block.data[:, i + 1]], axis=1)
-        for block in mesh.cells
-        if block.data.ndim == 2 and block.data.shape[1] >= 3
-        for i in range(1, block.data.shape[1] - 1)
-    ]
-    faces = np.concatenate(triangles) if triangles else np.zeros((0, 3))
-    return np.asarray(mesh.points, dtype=np.float64)[:, :3], faces.astype(np.int32)
-
-
-def write_mesh(path: Path, vertices: NDArray, faces: NDArray) -> None:
-    """Write triangles; the format follows the file's ending."""
-    meshio.write_points_cells(path, vertices, [("triangle", faces)])
 
 
 def _read_handles(path: Path) -> list[Handle]:

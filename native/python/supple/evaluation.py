@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native, map_metrics
+from .errors import SuppleError
 from .initial_maps import automatic_map, zoomout_map
 from .match_model import MatchModel
 from .match_sets import MatchSet, MatchShape
-from .matching import EPOCHS, Epoch, Matcher, MatchResult, configure
+from .matching import CONFIGURATIONS, EPOCHS, Epoch, Matcher, MatchResult, configure
 from .mesh import PreparedMesh
 from .model import Model
 from .refining import Refiner
@@ -95,6 +96,11 @@ def match_methods(
         "ljn": Method("ljn", _refined, refines=False, shared=found),
     }
     for config in configs:
+        if config not in (*rows, *CONFIGURATIONS):
+            raise SuppleError(
+                "bad_option",
+                f"'{config}' is no way to match. Use {', '.join((NO_NETWORK, *CONFIGURATIONS))}.",
+            )
         if config not in rows:
             configure(_native.JointTrainOptions(), config)
             rows[config] = Method(config, _features(model, config, epochs), refines=False)

@@ -76,21 +76,22 @@ def landmark_map(
         SuppleError: wrong_shape, index_out_of_range, bad_option. Cancelled: if progress was
             cancelled.
     """
-    pairs = np.asarray(landmarks)
+    pairs = arrays.array(landmarks, "landmarks")
     if pairs.ndim != 2 or pairs.shape[1] != 2:
         raise SuppleError(
             "wrong_shape",
             f"landmarks has shape {pairs.shape}; it must be (p, 2): a source and a target vertex.",
         )
-    return _result(
-        _native.landmark_map(
-            source.native,
-            target.native,
-            arrays.indices(pairs[:, 0], "landmarks"),
-            arrays.indices(pairs[:, 1], "landmarks"),
-            progress,
-        )
-    )
+    own, other = (arrays.indices(pairs[:, side], "landmarks") for side in (0, 1))
+    for whose, mesh, vertices in (("source", source, own), ("target", target, other)):
+        loose = np.flatnonzero((vertices < mesh.vertex_count) & ~np.isin(vertices, mesh.faces))
+        if len(loose):
+            raise SuppleError(
+                "bad_option",
+                f"Landmark {loose[0]} (0-based) is vertex {vertices[loose[0]]} of the {whose}, "
+                "which belongs to no face. Take one on the surface.",
+            )
+    return _result(_native.landmark_map(source.native, target.native, own, other, progress))
 
 
 def nearest_map(
@@ -182,9 +183,9 @@ def zoomout_map(
 
 
 def _flat_uvs(value: ArrayLike, name: str) -> NDArray[np.float64]:
-    array = np.asarray(value, dtype=np.float64)
+    array = arrays.array(value, name)
     if array.ndim != 3 or array.shape[1:] != (3, 2):
         raise SuppleError(
             "wrong_shape", f"{name} has shape {array.shape}; it must be (m, 3, 2), one a corner."
         )
-    return np.ascontiguousarray(array.reshape(-1, 2))
+    return np.ascontiguousarray(array.reshape(-1, 2), dtype=np.float64)

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .cases import read_mesh
 from .errors import SuppleError
+from .mesh_files import read_mesh
 
 
 @dataclass(frozen=True)
@@ -94,15 +94,14 @@ def read_match_set(folder: str | os.PathLike, *, refine: bool = True) -> MatchSe
 
 def read_indices(path: Path, count: int, of_what: str) -> NDArray[np.int32]:
     """A file of one 1-based index a line, 0-based. Raises SuppleError: bad_set."""
-    lines = _entries(path)
-    try:
-        found = np.array([int(line) for line in lines], dtype=np.int64)
-    except ValueError:
-        bad = next(i for i, line in enumerate(lines) if not line.strip().isdigit())
+    lines = read_text(path).split()
+    bad = next((i for i, line in enumerate(lines) if not is_index(line)), None)
+    if bad is not None:
         raise SuppleError(
             "bad_set",
             f"{path}, entry {bad + 1}: '{lines[bad][:40]}' is no whole number of 1 or more.",
-        ) from None
+        )
+    found = np.array([int(line) for line in lines], dtype=np.int64)
     outside = np.flatnonzero((found < 1) | (found > count))
     if len(outside):
         raise SuppleError(
@@ -113,20 +112,24 @@ def read_indices(path: Path, count: int, of_what: str) -> NDArray[np.int32]:
     return (found - 1).astype(np.int32)
 
 
-def _entries(path: Path) -> list[str]:
+def is_index(word: str) -> bool:
+    """Whether a word is a whole number that a mesh could have."""
+    return word.isascii() and word.isdigit() and len(word) < 19
+
+
+def read_text(path: Path) -> str:
+    """Raises SuppleError: bad_set."""
     if not path.is_file():
         raise SuppleError("bad_set", f"There is no file {path}.")
     try:
-        return path.read_text(encoding="utf-8").split()
+        return path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
         raise SuppleError("bad_set", f"{path} is no text file.") from None
 
 
 def _read_pairs(path: Path) -> list[tuple[str, str]]:
-    if not path.is_file():
-        raise SuppleError("bad_set", f"There is no file {path}.")
     pairs = []
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+    for number, line in enumerate(read_text(path).splitlines(), start=1):
         names = line.split()
         if not names:
             continue
@@ -147,6 +150,10 @@ def _read_shape(folder: Path, name: str) -> MatchShape:
     except SuppleError as error:
         raise SuppleError("bad_set", str(error)) from error
     template = read_indices(folder / "corres" / f"{name}.vts", len(vertices), f"vertices of {name}")
+    if len(template) == 0:
+        raise SuppleError(
+            "bad_set", f"{folder / 'corres' / name}.vts is empty; it says nothing of the truth."
+        )
     mirror = None
     path = folder / "corres" / f"{name}.mirror.vts"
     if path.is_file():

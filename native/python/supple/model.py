@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from . import _native
 from .errors import SuppleError
+from .files import write_whole
 
 FORMAT = "supple-ljn-1"
 _FOLDER = Path(__file__).parent / "models"
@@ -99,13 +100,7 @@ def write_tensors(
 ) -> None:
     """Write a safetensors file; an existing one is replaced whole or not at all, even where the
     power fails. The same contents are the same bytes."""
-    path = Path(path)
-    partial = path.with_name(path.name + ".partial")
-    with open(partial, "wb") as file:
-        file.write(_ordered(safetensors.numpy.save(tensors, metadata=metadata)))
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(partial, path)
+    write_whole(path, _ordered(safetensors.numpy.save(tensors, metadata=metadata)))
 
 
 def _ordered(content: bytes) -> bytes:

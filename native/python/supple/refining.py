@@ -165,6 +165,7 @@ def refine_result(
             "rounds": report.rounds,
             "eigenfunctions": report.eigenfunctions,
             "network": report.network,
+            "bounded_faces": report.bounded_faces,
             "signal_milliseconds": report.signal_milliseconds,
             "network_milliseconds": report.network_milliseconds,
             "recovery_milliseconds": report.recovery_milliseconds,

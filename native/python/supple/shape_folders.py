@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .cases import read_mesh
 from .errors import SuppleError
 from .mesh import Mesh
+from .mesh_files import read_mesh
 
 ENDINGS = (".obj", ".off", ".ply", ".stl")
 
@@ -46,13 +46,16 @@ def shuffled(
     return moved, order[faces[random.permutation(len(faces))]].astype(np.int32)
 
 
-def read_shapes(folder: str | os.PathLike, *, seed: int = 0) -> list[FolderShape]:
+def read_shapes(
+    folder: str | os.PathLike, *, seed: int = 0, leave_out: Path | None = None
+) -> list[FolderShape]:
     """Every mesh file of a folder, by name, shuffled in another order each.
 
     Hidden files and files that are no meshes (ENDINGS) are passed over.
 
     Args:
         seed: of the orders.
+        leave_out: a subfolder that is no group, as a checkpoint's.
 
     Raises:
         SuppleError: bad_set, naming the file or folder and what is wrong with it.
@@ -60,7 +63,13 @@ def read_shapes(folder: str | os.PathLike, *, seed: int = 0) -> list[FolderShape
     folder = Path(folder)
     if not folder.is_dir():
         raise SuppleError("bad_set", f"There is no folder {folder}.")
-    groups = sorted(p for p in folder.iterdir() if p.is_dir() and not p.name.startswith("."))
+    groups = sorted(
+        path
+        for path in folder.iterdir()
+        if path.is_dir()
+        and not path.name.startswith(".")
+        and (leave_out is None or path.resolve() != leave_out.resolve())
+    )
     loose = _mesh_files(folder)
     if groups and loose:
         raise SuppleError(

@@ -269,7 +269,7 @@ def transfer_corners(
     Raises:
         SuppleError: wrong_shape, not_finite, index_out_of_range, bad_option.
     """
-    values = np.asarray(corners, dtype=np.float64)
+    values = arrays.array(corners, "corners")
     if values.ndim != 3 or values.shape[1] != 3:
         raise SuppleError(
             "wrong_shape",
@@ -280,7 +280,7 @@ def transfer_corners(
         map.native,
         *_arrays(source),
         _arrays(target)[1],
-        np.ascontiguousarray(values.reshape(-1, count)),
+        np.ascontiguousarray(values.reshape(-1, count), dtype=np.float64),
         float(tolerance),
         bool(extrapolate),
         np.zeros(0, np.int32) if polygons is None else arrays.indices(polygons, "polygons"),

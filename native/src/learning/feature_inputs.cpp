@@ -62,12 +62,12 @@ RowMatrix<double> feature_inputs(FeatureInput kind, const SurfaceOperators& oper
     return operators.vertices;
   }
   if (basis.size() <= operators.component_count) {
-    throw Error(ErrorCode::bad_option,
-                "The inputs '" + std::string(to_string(kind)) +
-                    "' need more eigenfunctions than the " +
-                    std::to_string(operators.component_count) +
-                    " constants of the surface's components; the basis has " +
-                    std::to_string(basis.size()) + ". Ask for more.");
+    throw Error(
+        ErrorCode::bad_option,
+        "The inputs '" + std::string(to_string(kind)) + "' need more eigenfunctions than the " +
+            std::to_string(operators.component_count) +
+            " constants of the surface's components; the basis has " +
+            std::to_string(basis.size()) + ". Merge vertices at the same place, or ask for more.");
   }
   const WaveEnergies range = wave_energies(basis, basis, count);
   return kind == FeatureInput::wave_kernel

@@ -55,13 +55,15 @@ double share_equal(const Eigen::VectorXi& a, const Eigen::VectorXi& b) {
   return (a.array() == b.array()).cast<double>().mean();
 }
 
-Net awake() {
+Net awake(double size = 0.05) {
   const test::RestMesh<float> rest(zoo::perturbed_sphere(2, 3), 64, 0);
   const Points target = test::bent(rest.operators.vertices);
   return std::make_shared<const LocalJacobianNetwork<float>>(test::awake_network<float>(
       {.signal = SignalKind::spectral, .eigenfunctions = 64, .width = 32}, 5, rest.context,
-      test::signal_of(SignalKind::spectral, rest, target, 24), 0.05));
+      test::signal_of(SignalKind::spectral, rest, target, 24), size));
 }
+// One that stretches what it does not know.
+Net wild() { return awake(0.5); }
 
 class Refine : public ::testing::Test {
  protected:
@@ -98,6 +100,26 @@ TEST_F(Refine, BringsARoughMapNearerToTheTruth) {
     EXPECT_EQ(got.report.rounds, 2);
     EXPECT_EQ(got.report.network, network != nullptr);
   }
+}
+
+TEST_F(Refine, TornMapsDoNotRunAway) {
+  // Two caps that go to each other's places, and a tenth of all vertices anywhere.
+  std::mt19937 random(6);
+  Eigen::VectorXi torn = identity(n);
+  const Eigen::VectorXd height = source.vertices.col(2);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (std::abs(height[i]) > 0.7 || random() % 10 == 0) {
+      torn[i] = static_cast<int>(random() % static_cast<unsigned>(n));
+    }
+  }
+  for (const Net& network : {Net(), wild()}) {
+    const RefineResult got =
+        Refiner(from, to, network, {.counts = {40, 60, 60, 60, 60, 60}}).refine(torn);
+    EXPECT_LT(test::diagonal(got.recovered), 2.0 * test::diagonal(bent));
+    EXPECT_LT(apart(bent, got.point_map, identity(n)), apart(bent, torn, identity(n)));
+    EXPECT_EQ(got.report.bounded_faces > 0, network != nullptr);
+  }
+  EXPECT_EQ(Refiner(from, to, awake(), kRounds).refine(rough).report.bounded_faces, 0);
 }
 
 TEST_F(Refine, LaysTheSourceOntoTheTargetInTheTargetsUnits) {

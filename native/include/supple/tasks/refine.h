@@ -47,6 +47,10 @@ struct RefineReport {
   int rounds = 0;
   int eigenfunctions = 0;  ///< of the last round with a signal
   bool network = false;
+  /// Source faces that the network would have stretched beyond a norm of 4 (areas 1), in the last
+  /// round with a signal: that many are where the map is torn. They are stretched so far and no
+  /// further.
+  int bounded_faces = 0;
   double signal_milliseconds = 0.0;  ///< pull-back and signal; the whole of `spectral_projection`
   double network_milliseconds = 0.0;
   double recovery_milliseconds = 0.0;
@@ -75,7 +79,7 @@ struct RefineResult {
 ///
 ///     coarse   X = Phi_s Phi_s^+ (Phi_t Phi_t^+ V_t)(y) = Phi_s C_21 Phi_t^+ V_t     (Eqn 10)
 ///     signal   `spectral_signal` of the source and X                                 (Eqn 9)
-///     network  a Jacobian J a face; without one, the coarse Jacobian
+///     network  a Jacobian J a face, no longer than 4; without one, the coarse Jacobian
 ///     recover  V near V_t(y) with Jacobians J                          (`EmbeddingRecovery`)
 ///     nearest  y <- the points of the target nearest to V, facing the same way
 ///

@@ -7,7 +7,7 @@ import typer
 
 import supple
 
-from .console import console
+from .console import print_error
 
 
 def show_cache(
@@ -18,7 +18,7 @@ def show_cache(
         removed = supple.cache.clear() if clear else None
         kept, cap, enabled = supple.cache.size(), supple.cache.max_bytes(), supple.cache.enabled()
     except supple.SuppleError as error:
-        console.print(f"[red]error[/red] {error}")
+        print_error(error)
         raise typer.Exit(1) from error
     lines = {
         "folder": str(supple.cache.folder()),

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the commands share: the terminal, progress, and writing files."""
 
-import os
 import sys
 import threading
 from collections.abc import Callable
-from pathlib import Path
 from typing import TypeVar
 
 import rich.console
+import rich.markup
 import rich.progress
 
 import supple
@@ -85,12 +84,9 @@ def watched(label: str, work: Callable[[supple.Progress], _Result], note: object
     return outcome["result"]
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Writes a file, or leaves what was there as it was."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".partial")
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, path)
+def print_error(error: object) -> None:
+    """Not as markup: paths may have brackets."""
+    console.print(f"[red]error[/red] {rich.markup.escape(str(error))}", highlight=False)
 
 
 def peak_mebibytes() -> float | None:

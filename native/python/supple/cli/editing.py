@@ -15,8 +15,10 @@ import typer
 
 import supple
 
-from ..cases import EditCase, read_case, write_mesh
-from .console import console, watched, write_whole
+from ..cases import EditCase, read_case
+from ..files import write_whole
+from ..mesh_files import write_mesh
+from .console import print_error, watched
 
 # A solve is measured this often after one that warms up; the middle one is reported.
 _MEASURED_SOLVES = 3
@@ -60,7 +62,7 @@ def edit(
         chosen = supple.load_model(model) if network else None
         out.mkdir(parents=True, exist_ok=True)
     except (supple.SuppleError, OSError) as error:
-        console.print(f"[red]error[/red] {error}")
+        print_error(error)
         raise typer.Exit(1) from error
     for folder in cases:
         try:
@@ -73,7 +75,7 @@ def edit(
             write_mesh(out / f"{case.name}.obj", vertices, case.faces)
         except (supple.SuppleError, OSError) as error:
             errors[str(folder)] = str(error)
-            console.print(f"[red]error[/red] {folder}: {error}")
+            print_error(f"{folder}: {error}")
     if report is not None:
         content = {
             "cases": figures,

@@ -12,8 +12,9 @@ import typer
 
 import supple
 
-from ..cases import read_mesh, write_mesh
-from .console import console, watched, write_whole
+from ..files import check_outputs, write_whole
+from ..mesh_files import check_ending, read_mesh, write_mesh
+from .console import print_error, watched
 from .editing import Mode
 
 # The ways that stand beside each other in every report, and what they mean to Editor.solve.
@@ -38,6 +39,8 @@ def estimate(
 ) -> None:
     """Estimate a motion from a few handles where it is largest, and measure what that misses."""
     try:
+        check_outputs((out, report), (source, target, model))
+        check_ending(out)
         vertices, faces = read_mesh(source)
         truth, _ = read_mesh(target)
         prepared = watched(
@@ -58,7 +61,6 @@ def estimate(
             for name, how in _ROWS.items()
         }
         written = _solved(editor, mode.value, {"mode": mode.value, "network": network})
-        out.parent.mkdir(parents=True, exist_ok=True)
         write_mesh(out, written, faces)
         if report is not None:
             content = {
@@ -75,7 +77,7 @@ def estimate(
             }
             write_whole(report, json.dumps(content, indent=1))
     except (supple.SuppleError, OSError) as error:
-        console.print(f"[red]error[/red] {error}", highlight=False)
+        print_error(error)
         raise typer.Exit(1) from error
     rich.console.Console().print(_table(rows))
     typer.echo(

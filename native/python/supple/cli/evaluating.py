@@ -2,6 +2,7 @@
 """The commands `supple evaluate refine` and `supple evaluate match`."""
 
 import json
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -12,9 +13,10 @@ import typer
 import supple
 
 from .. import evaluation
+from ..files import check_outputs, write_whole
 from ..match_sets import MatchSet, read_match_set
 from ..matching import EPOCHS
-from .console import console, progress_bar, write_whole
+from .console import print_error, progress_bar
 
 
 def evaluate_refine(
@@ -40,13 +42,14 @@ def evaluate_refine(
     Seconds are of a warm refinement: meshes prepared, factors ready.
     """
     try:
+        _check_report(report)
         chosen = evaluation.methods(supple.load_model(model))
         match_set = _first_pairs(read_match_set(folder), pairs)
         result = _evaluated(match_set, chosen, runs=runs, cache=cache)
         result |= {"model": model, "runs": runs, "version": supple.__version__}
         _write(result, report)
     except (supple.SuppleError, OSError) as error:
-        console.print(f"[red]error[/red] {error}", highlight=False)
+        print_error(error)
         raise typer.Exit(1) from error
     rich.console.Console().print(_table(result))
 
@@ -76,6 +79,7 @@ def evaluate_match(
     Seconds are of all but the preparation of meshes: adaptation to the pair is counted.
     """
     try:
+        _check_report(report)
         networks = supple.load_match_model(model)
         names = list(dict.fromkeys(name.strip() for name in configs.split(",")))
         chosen = evaluation.match_methods(networks, names, epochs=epochs)
@@ -84,7 +88,7 @@ def evaluate_match(
         result |= {"model": networks.metadata, "epochs": epochs, "version": supple.__version__}
         _write(result, report)
     except (supple.SuppleError, OSError) as error:
-        console.print(f"[red]error[/red] {error}", highlight=False)
+        print_error(error)
         raise typer.Exit(1) from error
     rich.console.Console().print(_table(result))
 
@@ -107,10 +111,26 @@ def _evaluated(match_set: MatchSet, chosen: list[evaluation.Method], **options: 
         ).run()
 
 
+def _check_report(report: Path | None) -> None:
+    if report is not None:
+        check_outputs((report, report.with_suffix(".md")))
+
+
 def _write(result: dict, report: Path | None) -> None:
     if report is not None:
-        write_whole(report, json.dumps(result, indent=1))
+        write_whole(report, json.dumps(_finite(result), indent=1, allow_nan=False))
         write_whole(report.with_suffix(".md"), evaluation.markdown(result))
+
+
+def _finite(value: object) -> object:
+    """JSON has no NaN: what could not be measured is null."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
 
 
 def _table(result: dict) -> rich.table.Table:

@@ -8,8 +8,9 @@ import numpy as np
 
 import supple
 
-from ..cases import read_mesh
-from .console import console, watched, write_whole
+from ..files import write_whole
+from ..mesh_files import read_mesh
+from .console import console, watched
 
 
 def prepared(paths: Iterable[Path], *, cache: bool) -> list[supple.PreparedMesh]:
@@ -17,19 +18,23 @@ def prepared(paths: Iterable[Path], *, cache: bool) -> list[supple.PreparedMesh]
     meshes = []
     for path in paths:
         vertices, faces = read_mesh(path)
-        meshes.append(
-            watched(
+        try:
+            mesh = watched(
                 f"{path.name}: preparing",
                 lambda p, v=vertices, f=faces: supple.PreparedMesh(v, f, progress=p, cache=cache),
             )
-        )
+        except supple.SuppleError as error:
+            raise supple.SuppleError(error.code, f"{path}: {error}") from error
+        print_notes(mesh.notes, path.name)
+        meshes.append(mesh)
     return meshes
 
 
-def print_notes(notes: Iterable[supple.Note]) -> None:
+def print_notes(notes: Iterable[supple.Note], about: str = "") -> None:
     """A line each."""
     for note in notes:
-        console.print(f"note: {note.message}", highlight=False)
+        text = f"note: {about}: {note.message}" if about else f"note: {note.message}"
+        console.print(text, highlight=False, markup=False)
 
 
 def write_map(path: Path, point_map: np.ndarray) -> None:

@@ -12,9 +12,10 @@ import typer
 
 import supple
 
-from ..cases import write_mesh
+from ..files import check_outputs, write_whole
 from ..matching import CONFIGURATIONS, EPOCHS
-from .console import Latest, console, epoch_text, peak_mebibytes, watched, write_whole
+from ..mesh_files import check_ending, write_mesh
+from .console import Latest, epoch_text, peak_mebibytes, print_error, watched
 from .maps import prepared, print_notes, write_map, written
 
 Config = StrEnum("Config", {name: name for name in CONFIGURATIONS})
@@ -46,6 +47,9 @@ def match(
 ) -> None:
     """Map one mesh to another from their shapes alone, with features that adapt to the pair."""
     try:
+        check_outputs((out, deformed, save_model, report), (source, target, model))
+        if deformed is not None:
+            check_ending(deformed)
         networks = supple.load_match_model(model)
         meshes = prepared((source, target), cache=cache)
         began = time.perf_counter()
@@ -68,10 +72,8 @@ def match(
         score = supple.map_score(*meshes, result.point_map)
         write_map(out, result.point_map)
         if deformed is not None:
-            deformed.parent.mkdir(parents=True, exist_ok=True)
             write_mesh(deformed, result.refined.recovered, meshes[0].faces)
         if save_model is not None:
-            save_model.parent.mkdir(parents=True, exist_ok=True)
             matcher.model.save(save_model)
         if report is not None:
             content = {
@@ -90,6 +92,6 @@ def match(
             }
             write_whole(report, json.dumps(content, indent=1))
     except (supple.SuppleError, OSError) as error:
-        console.print(f"[red]error[/red] {error}", highlight=False)
+        print_error(error)
         raise typer.Exit(1) from error
     typer.echo(written(out, result.point_map, score))

@@ -5,16 +5,18 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
-import meshio
 import numpy as np
 import typer
 
 import supple
 
-from ..cases import read_mesh
-from ..match_sets import read_indices
-from .console import console, watched
+from ..files import check_outputs
+from ..match_sets import is_index, read_indices, read_text
+from ..mesh_files import read_uvs
+from .console import console, print_error, watched
 from .maps import prepared, print_notes, write_map, written
+
+FAR_LANDMARK = 0.03
 
 
 class Start(StrEnum):
@@ -39,25 +41,34 @@ def refine(
         typer.Option(help="Pairs to start from: a source and a target vertex a line, from 1."),
     ] = None,
     start: Annotated[
-        Start, typer.Option(help="What to start from, without --map and --landmarks.")
-    ] = Start.automatic,
+        Start | None,
+        typer.Option(
+            help="What to start from, without --map and --landmarks: the shapes alone; the nearest "
+            "points as the meshes lie, or after one was laid on the other; the same place in their "
+            "UV maps.",
+            show_default="automatic",
+        ),
+    ] = None,
     network: Annotated[bool, typer.Option(help="Use the network, or none.")] = True,
     model: Annotated[str, typer.Option(help="Shipped network or .safetensors file.")] = "spectral",
     cache: Annotated[bool, typer.Option(help="Keep prepared meshes on disk, and use them.")] = True,
 ) -> None:
     """Map one mesh to another: find or read a rough map, and refine it."""
     try:
-        if first_map is not None and landmarks is not None:
-            raise supple.SuppleError("bad_option", "Give --map or --landmarks, not both.")
+        if sum(given is not None for given in (first_map, landmarks, start)) > 1:
+            raise supple.SuppleError("bad_option", "Give one of --map, --landmarks and --start.")
+        check_outputs((out,), (source, target, first_map, landmarks, model))
         meshes = prepared((source, target), cache=cache)
         initial = _initial(meshes, (source, target), first_map, landmarks, start)
         refiner = supple.Refiner(*meshes, model=model if network else None)
         result = watched("refining", lambda p: refiner.refine(initial, progress=p))
         print_notes(refiner.notes)
+        if landmarks is not None:
+            _note_moved(meshes[1], _read_landmarks(landmarks), result.point_map)
         score = supple.map_score(*meshes, result.point_map)
         write_map(out, result.point_map)
     except (supple.SuppleError, OSError) as error:
-        console.print(f"[red]error[/red] {error}", highlight=False)
+        print_error(error)
         raise typer.Exit(1) from error
     typer.echo(written(out, result.point_map, score))
 
@@ -67,7 +78,7 @@ def _initial(
     paths: tuple[Path, Path],
     first_map: Path | None,
     landmarks: Path | None,
-    start: Start,
+    start: Start | None,
 ) -> np.ndarray:
     """The map to refine; what is to be said of it is printed."""
     if first_map is not None:
@@ -81,25 +92,23 @@ def _initial(
     if landmarks is not None:
         pairs = _read_landmarks(landmarks)
         found = watched("landmarks", lambda p: supple.landmark_map(*meshes, pairs, progress=p))
-    elif start is Start.automatic:
+    elif start in (None, Start.automatic):
         found = watched("first map", lambda p: supple.automatic_map(*meshes, progress=p))
     elif start is Start.uv:
-        found = supple.uv_map(*meshes, *(_read_uvs(path) for path in paths))
+        found = supple.uv_map(*meshes, *(read_uvs(path) for path in paths))
     else:
-        found = supple.nearest_map(*meshes, aligned=start is Start.aligned)
+        found = supple.nearest_map(*meshes, aligned=start is Start.nearest)
     print_notes(found.notes)
     return found.point_map
 
 
 def _read_landmarks(path: Path) -> np.ndarray:
-    if not path.is_file():
-        raise supple.SuppleError("bad_option", f"There is no file {path}.")
     pairs = []
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+    for number, line in enumerate(read_text(path).splitlines(), start=1):
         words = line.replace(",", " ").split()
         if not words or words[0].startswith("#"):
             continue
-        if len(words) != 2 or not all(word.isdigit() and int(word) > 0 for word in words):
+        if len(words) != 2 or not all(is_index(word) and int(word) > 0 for word in words):
             raise supple.SuppleError(
                 "bad_option", f"{path}, line {number}: '{line}' is no pair of vertices, from 1."
             )
@@ -109,13 +118,14 @@ def _read_landmarks(path: Path) -> np.ndarray:
     return np.array(pairs)
 
 
-def _read_uvs(path: Path) -> np.ndarray:
-    """(m, 3, 2) of a mesh file with texture coordinates at its vertices."""
-    mesh = meshio.read(path)
-    for name in ("obj:vt", "texture", "uv", "st"):
-        if name in mesh.point_data and len(mesh.point_data[name]) == len(mesh.points):
-            uvs = np.asarray(mesh.point_data[name], dtype=np.float64)[:, :2]
-            return uvs[read_mesh(path)[1]]
-    raise supple.SuppleError(
-        "bad_option", f"{path} has no texture coordinates at its vertices; start otherwise."
-    )
+def _note_moved(target: supple.PreparedMesh, pairs: np.ndarray, point_map: np.ndarray) -> None:
+    """Landmarks say where to start; refining may lead away from them."""
+    wanted, found = target.vertices[pairs[:, 1]], target.vertices[point_map[pairs[:, 0]]]
+    away = np.linalg.norm(found - wanted, axis=1) / target.diagonal
+    far = np.flatnonzero(away > FAR_LANDMARK)
+    if len(far):
+        console.print(
+            f"note: {len(far)} of {len(pairs)} landmarks ended farther than {FAR_LANDMARK:.0%} of "
+            f"the target's size from where they were put, number {far[0] + 1} by "
+            f"{away[far[0]]:.0%}. They may contradict each other or the shapes."
+        )

@@ -13,9 +13,10 @@ import typer
 
 import supple
 
+from ..files import check_outputs, write_whole
 from ..matching import TERMS, Epoch
 from ..shape_folders import FolderShape, read_shapes
-from .console import Latest, console, epoch_text, peak_mebibytes, progress_bar, watched, write_whole
+from .console import Latest, epoch_text, peak_mebibytes, print_error, progress_bar, watched
 from .matching import Config
 
 
@@ -77,6 +78,14 @@ def train_unsupervised(
     try:
         if out.suffix != ".safetensors":
             raise supple.SuppleError("bad_option", f"{out} must end in .safetensors.")
+        if guided_epochs is not None and guided_epochs > epochs:
+            raise supple.SuppleError(
+                "bad_option",
+                f"{guided_epochs} guided epochs of {epochs}: --guided-epochs must be no more than "
+                "--epochs.",
+            )
+        check_outputs((out,), () if start == "none" else (start,))
+        kept = checkpoint or out.with_suffix(".checkpoint")
         metadata = {
             "training": f"unsupervised, {config.value}, {epochs} epochs",
             "seed": str(seed),
@@ -86,7 +95,7 @@ def train_unsupervised(
         model = None if start == "none" else supple.load_match_model(start)
         if model is not None:
             metadata = _continued(model.metadata, metadata)
-        shapes = read_shapes(folder, seed=seed)
+        shapes = read_shapes(folder, seed=seed, leave_out=kept)
         meshes = _prepared(shapes, cache=cache)
         began = time.perf_counter()
         loss = Latest(epoch_text)
@@ -104,14 +113,13 @@ def train_unsupervised(
                 patience=patience,
                 seed=seed,
                 metadata=metadata,
-                checkpoint=checkpoint or out.with_suffix(".checkpoint"),
+                checkpoint=kept,
                 callback=loss,
                 progress=p,
             ),
             loss,
         )
         seconds = time.perf_counter() - began
-        out.parent.mkdir(parents=True, exist_ok=True)
         result.model.save(out)
         content = {
             "shapes": [shape.name for shape in shapes],
@@ -126,7 +134,7 @@ def train_unsupervised(
         write_whole(metrics, json.dumps(content, indent=1) + "\n")
         write_whole(curve, _curve(result.history))
     except (supple.SuppleError, OSError) as error:
-        console.print(f"[red]error[/red] {error}", highlight=False)
+        print_error(error)
         raise typer.Exit(1) from error
     typer.echo(
         f"wrote {out}, {metrics.name} and {curve.name}: {len(shapes)} meshes, "
