@@ -218,6 +218,22 @@ def pair_of_grids():
     return [supple.PreparedMesh(vertices, faces, cache=False) for _ in range(2)]
 
 
+def test_what_is_no_number_and_no_mesh_is_named(pair_of_grids):
+    source, target = pair_of_grids
+    cases = {
+        "counts": lambda: supple.Refiner(source, target, counts="abc"),
+        "pull": lambda: supple.Refiner(source, target, pull="x"),
+        "settling_rounds": lambda: supple.Refiner(source, target, settling_rounds=1.5),
+        "epochs": lambda: supple.Matcher(source, target, epochs=1.5),
+        "seed": lambda: supple.Matcher(source, target, seed=[1, 2]),
+        "ndarray is no mesh": lambda: supple.closest_points(source.vertices, source.vertices),
+        "NoneType is no mesh": lambda: supple.closest_points(None, source.vertices),
+        "source_uvs": lambda: supple.uv_map(source, target, [["a"]], [["b"]]),
+    }
+    for words, call in cases.items():
+        refused(call, words, code="wrong_shape")
+
+
 def test_a_checkpoint_beside_the_meshes_is_no_group(tmp_path):
     for i in range(2):
         (tmp_path / f"{i}.obj").write_text(QUAD + "f 1 2 3\nf 1 3 4\nf 2 5 3\n")

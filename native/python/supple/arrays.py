@@ -18,6 +18,20 @@ def array(value: ArrayLike, name: str) -> NDArray:
     return result
 
 
+def number(value: object, name: str) -> float:
+    """One real number. Errors: wrong_shape."""
+    found = array(value, name)
+    if found.ndim != 0:
+        raise SuppleError("wrong_shape", f"{name} has shape {found.shape}; it must be one number.")
+    return float(found)
+
+
+def whole(value: object, name: str) -> int:
+    """One whole number. Errors: wrong_shape; index_out_of_range beyond 2**31."""
+    number(value, name)
+    return int(_whole(array(value, name), name).item())
+
+
 def points(value: ArrayLike, name: str = "vertices", dtype: DTypeLike = np.float64) -> NDArray:
     """(n, 3), float64 where not told, C order. Errors: wrong_shape."""
     found = array(value, name)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _native
+from . import _native, arrays
 from .errors import SuppleError
 from .initial_maps import InitialMap, MapScore
 from .initial_maps import _result as _initial_map
@@ -132,8 +132,8 @@ class Matcher:
         self.target = _prepared(target, "target", progress)
         options = _native.MatchOptions()
         configure(options.training, config)
-        options.training.epochs = epochs
-        options.training.seed = seed
+        options.training.epochs = arrays.whole(epochs, "epochs")
+        options.training.seed = arrays.whole(seed, "seed")
         options.automatic = automatic
         self._metadata = model.metadata
         options.functions = functions_of(config)

@@ -75,7 +75,7 @@ class Refiner:
         notes: list of Note: "components_differ", "boundaries_differ", "fewer_eigenfunctions".
 
     Raises:
-        SuppleError: bad_option, model_file, and those of PreparedMesh.
+        SuppleError: bad_option, wrong_shape, model_file, and those of PreparedMesh.
         Cancelled: if progress was cancelled.
     """
 
@@ -104,18 +104,23 @@ class Refiner:
         self.target = _prepared(target, "target", progress)
         self.model = model
         given = {
-            "counts": None if counts is None else [int(count) for count in counts],
-            "settling_rounds": settling_rounds,
             "pull": pull,
             "point_weight": point_weight,
             "jacobian_weight": jacobian_weight,
             "facing": facing,
         }
+        given = {
+            name: arrays.number(value, name) for name, value in given.items() if value is not None
+        }
+        if counts is not None:
+            given["counts"] = arrays.indices(counts, "counts").tolist()
+        if settling_rounds is not None:
+            given["settling_rounds"] = arrays.whole(settling_rounds, "settling_rounds")
         options = _native.RefineOptions(
             method=method,
             form=form,
             backward=backward,
-            **{name: value for name, value in given.items() if value is not None},
+            **given,
         )
         self._backward = backward
         self._native = _native.Refiner(

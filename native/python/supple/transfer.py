@@ -136,6 +136,11 @@ class ShrinkFit(NamedTuple):
 def _arrays(mesh: AnyMesh) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     if isinstance(mesh, Mesh | PreparedMesh):
         return mesh.vertices, mesh.faces
+    if not isinstance(mesh, Sequence) or len(mesh) != 2:
+        raise SuppleError(
+            "wrong_shape",
+            f"{type(mesh).__name__} is no mesh: give a Mesh, a PreparedMesh or (vertices, faces).",
+        )
     vertices, faces = mesh
     return arrays.points(vertices), arrays.triangles(faces)
 
