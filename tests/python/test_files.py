@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -54,7 +56,13 @@ def test_links_and_devices_stay_what_they_are(tmp_path):
     files.write_whole(link, "after")
     assert link.is_symlink()
     assert real.read_text() == "after"
+    real.chmod(0o600)
+    files.write_whole(real, "more")
+    assert real.stat().st_mode & 0o777 == 0o600
     files.write_whole("/dev/null", "nothing")
+    command = "from supple.files import write_whole; write_whole('/dev/stdout', 'through')"
+    piped = subprocess.run([sys.executable, "-c", command], capture_output=True, check=True)
+    assert piped.stdout == b"through"
     assert Path("/dev/null").is_char_device()
 
 
@@ -116,8 +124,14 @@ def test_obj_with_seams_and_indices_that_count_backwards(tmp_path):
     assert np.array_equal(uvs, expected)
     path.write_text(QUAD + "vt 0 0\nf 1/1 2 3\n")
     refused(lambda: mesh_files.read_uvs(path), "no texture coordinates")
-    path.write_text(QUAD + "vt 0 0\nf 1/1 2/2 3/1\n")
-    refused(lambda: mesh_files.read_uvs(path), "line 7", "of 1")
+    for line in ("f 1/1 2/2 3/1", "f 1/0 2/1 3/1", "vt", "v 1 2", f"f 1 2 {2**32 + 2}"):
+        path.write_text(QUAD + f"vt 0 0\n{line}\n")
+        refused(lambda: mesh_files.read_uvs(path), "line 7", line)
+        refused(lambda: mesh_files.read_mesh(path), "line 7", line)
+    path.write_bytes("\ufeff# Cr\u00e9\u00e9\n".encode() + QUAD.encode() + b"# \xe9\nf 1 2 3\n")
+    assert mesh_files.read_mesh(path)[0].shape == (5, 3)
+    path.write_bytes(b"\xef\xbb\xbf" + QUAD.encode() + b"f 1 2 3\n")
+    assert mesh_files.read_mesh(path)[0].shape == (5, 3)
 
 
 @pytest.mark.parametrize(
@@ -224,7 +238,7 @@ def test_what_is_no_number_and_no_mesh_is_named(pair_of_grids):
         "counts": lambda: supple.Refiner(source, target, counts="abc"),
         "pull": lambda: supple.Refiner(source, target, pull="x"),
         "settling_rounds": lambda: supple.Refiner(source, target, settling_rounds=1.5),
-        "epochs": lambda: supple.Matcher(source, target, epochs=1.5),
+        "epochs is 1.5": lambda: supple.Matcher(source, target, epochs=1.5),
         "seed": lambda: supple.Matcher(source, target, seed=[1, 2]),
         "ndarray is no mesh": lambda: supple.closest_points(source.vertices, source.vertices),
         "NoneType is no mesh": lambda: supple.closest_points(None, source.vertices),

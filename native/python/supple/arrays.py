@@ -27,9 +27,10 @@ def number(value: object, name: str) -> float:
 
 
 def whole(value: object, name: str) -> int:
-    """One whole number. Errors: wrong_shape; index_out_of_range beyond 2**31."""
-    number(value, name)
-    return int(_whole(array(value, name), name).item())
+    """One whole number. Errors: wrong_shape."""
+    if not number(value, name).is_integer() or isinstance(value, bool):
+        raise SuppleError("wrong_shape", f"{name} is {value}; it must be a whole number.")
+    return int(value)
 
 
 def points(value: ArrayLike, name: str = "vertices", dtype: DTypeLike = np.float64) -> NDArray:

@@ -9,7 +9,7 @@ class SuppleError(ValueError):
         code: what went wrong, for programs: "empty_mesh", "wrong_shape", "index_out_of_range",
             "not_finite", "empty_handle", "overlapping_handles", "no_handles", "singular_matrix",
             "stale_mesh", "model_file", "array_file", "bad_option", "not_positive_definite",
-            "no_convergence", "cancelled".
+            "no_convergence", "cancelled"; of files "bad_case", "bad_set", "cannot_write".
     """
 
     def __init__(self, code: str, message: str) -> None:

@@ -3,6 +3,7 @@
 
 import contextlib
 import os
+import shutil
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -17,30 +18,27 @@ def write_whole(path: str | os.PathLike, content: str | bytes) -> None:
     Raises:
         SuppleError: cannot_write, naming the file and why.
     """
-
-    def write(partial: Path) -> None:
-        data = content.encode() if isinstance(content, str) else content
-        with open(partial, "wb") as file:
-            file.write(data)
-            file.flush()
-            if partial.is_file():
-                os.fsync(file.fileno())
-
-    replace_whole(path, write)
+    data = content.encode() if isinstance(content, str) else content
+    replace_whole(path, lambda partial: partial.write_bytes(data))
 
 
-def replace_whole(path: str | os.PathLike, write: Callable[[Path], None]) -> None:
+def replace_whole(path: str | os.PathLike, write: Callable[[Path], object]) -> None:
     """The same for a file that `write` writes at the path it is called with, of the same ending."""
     check_output(path)
-    path = Path(os.path.realpath(path))  # a link stays one
+    path = Path(path)
     try:
-        if path.exists() and not path.is_file():
+        if _is_special(path):
             write(path)
             return
+        path = Path(os.path.realpath(path))  # a link stays one
         path.parent.mkdir(parents=True, exist_ok=True)
         partial = path.with_name(f".{path.stem}.partial{path.suffix}")
         try:
             write(partial)
+            with open(partial, "rb+") as file:
+                os.fsync(file.fileno())
+            if path.exists():
+                shutil.copymode(path, partial)
             os.replace(partial, path)
         except BaseException:
             with contextlib.suppress(OSError):
@@ -54,6 +52,11 @@ def replace_whole(path: str | os.PathLike, write: Callable[[Path], None]) -> Non
         ) from error
 
 
+def _is_special(path: Path) -> bool:
+    """A pipe, a terminal, a device: what a link under /dev leads to may have no name of its own."""
+    return path.exists() and (not path.is_file() or path.parts[:2] == ("/", "dev"))
+
+
 def check_output(path: str | os.PathLike) -> None:
     """What can be known before long work: that it names a file, in a folder.
 
@@ -65,6 +68,10 @@ def check_output(path: str | os.PathLike) -> None:
         raise SuppleError("cannot_write", f"'{path}' names no file to write.")
     if path.is_dir():
         raise SuppleError("cannot_write", f"{path} is a folder; name a file in it.")
+    if path.exists() and not os.access(path, os.W_OK):
+        raise SuppleError(
+            "cannot_write", f"{path} may not be written to; allow it or name another."
+        )
     for folder in path.parents:
         if folder.exists():
             if not folder.is_dir():

@@ -84,7 +84,9 @@ def landmark_map(
         )
     own, other = (arrays.indices(pairs[:, side], "landmarks") for side in (0, 1))
     for whose, mesh, vertices in (("source", source, own), ("target", target, other)):
-        loose = np.flatnonzero((vertices < mesh.vertex_count) & ~np.isin(vertices, mesh.faces))
+        loose = np.flatnonzero(
+            (vertices >= 0) & (vertices < mesh.vertex_count) & ~np.isin(vertices, mesh.faces)
+        )
         if len(loose):
             raise SuppleError(
                 "bad_option",

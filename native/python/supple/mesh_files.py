@@ -4,6 +4,8 @@
 import contextlib
 import io
 import os
+import threading
+from dataclasses import dataclass
 from pathlib import Path
 
 import meshio
@@ -16,16 +18,20 @@ from .errors import SuppleError
 COMMON = (".obj", ".off", ".ply", ".stl", ".vtk")
 _SURFACE = ("triangle", "quad", "polygon")
 _IGNORED = ("line", "vertex")
+_ONE_AT_A_TIME = threading.Lock()  # what is printed goes elsewhere for the whole process
 
 
 def read_mesh(path: str | os.PathLike) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """(n, 3) vertices in file order and (m, 3) triangles of any format meshio reads; larger
+    """(n, 3) vertices in file order and (m, 3) triangles of OBJ and any format meshio reads; larger
     polygons are split into fans.
 
     Raises:
         SuppleError: bad_case.
     """
     path = Path(path)
+    if path.suffix.lower() == ".obj":
+        found = _read_obj(path)
+        return found.vertices, _whole(path, _fans(found.corners))
     mesh = _read(path)
     triangles = []
     for block in mesh.cells:
@@ -38,16 +44,12 @@ def read_mesh(path: str | os.PathLike) -> tuple[NDArray[np.float64], NDArray[np.
                 f"{path} holds cells of the kind '{block.type}', which are no flat polygons. Save "
                 "the surface as triangles.",
             )
-        data = np.asarray(block.data)
-        triangles += [
-            np.stack([data[:, 0], data[:, i], data[:, i + 1]], axis=1)
-            for i in range(1, data.shape[1] - 1)
-        ]
+        triangles.append(_fans(np.asarray(block.data)))
     points = np.asarray(mesh.points, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] < 3:
         raise SuppleError("bad_case", f"{path} has no vertices with three coordinates.")
-    faces = np.concatenate(triangles) if triangles else np.zeros((0, 3))
-    return points[:, :3], faces.astype(np.int32)
+    faces = np.concatenate(triangles) if triangles else np.zeros((0, 3), dtype=np.int64)
+    return points[:, :3], _whole(path, faces)
 
 
 def read_uvs(path: str | os.PathLike) -> NDArray[np.float64]:
@@ -57,14 +59,20 @@ def read_uvs(path: str | os.PathLike) -> NDArray[np.float64]:
         SuppleError: bad_case.
     """
     path = Path(path)
-    faces = read_mesh(path)[1]
-    found = _obj_uvs(path) if path.suffix.lower() == ".obj" else _vertex_uvs(path, faces)
-    if found is None or len(found) != len(faces):
-        raise SuppleError(
-            "bad_case",
-            f"{path} has no texture coordinates at all corners of its faces; start otherwise.",
-        )
-    return found
+    if path.suffix.lower() == ".obj":
+        found = _read_obj(path)
+        corners = _fans(found.uv_corners)
+        if len(corners) and corners.min() >= 0:
+            return found.uvs[corners]
+    else:
+        faces = read_mesh(path)[1]
+        values = _vertex_uvs(path)
+        if values is not None and len(faces) and faces.max() < len(values):
+            return values[faces]
+    raise SuppleError(
+        "bad_case",
+        f"{path} has no texture coordinates at all corners of its faces; start otherwise.",
+    )
 
 
 def check_ending(path: str | os.PathLike) -> None:
@@ -73,9 +81,9 @@ def check_ending(path: str | os.PathLike) -> None:
     Raises:
         SuppleError: cannot_write.
     """
-    if Path(path).suffix.lower() not in COMMON:
+    if Path(path).suffix.lower() not in meshio.extension_to_filetypes:
         raise SuppleError(
-            "cannot_write", f"{path} must end in one of {', '.join(COMMON)} to hold a mesh."
+            "cannot_write", f"{path} must end in {', '.join(COMMON)} or the like to hold a mesh."
         )
 
 
@@ -93,19 +101,12 @@ def write_mesh(path: str | os.PathLike, vertices: NDArray, faces: NDArray) -> No
 def _read(path: Path) -> meshio.Mesh:
     if not path.is_file():
         raise SuppleError("bad_case", f"There is no file {path}.")
+    _check_header(path)
     said = io.StringIO()  # by meshio, which prints what it refuses and leaves
     try:
-        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
-            if path.suffix.lower() == ".obj":
-                return meshio.read(io.StringIO(_plain_obj(path)), file_format="obj")
-            if path.suffix.lower() == ".off":
-                _check_off(path)
-            if path.suffix.lower() == ".ply":
-                _check_ply(path)
+        with _ONE_AT_A_TIME, contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
             return meshio.read(path)
     except (Exception, SystemExit) as error:
-        if isinstance(error, SuppleError):
-            raise
         words = " ".join(said.getvalue().split()) or str(error)
         raise SuppleError(
             "bad_case",
@@ -114,99 +115,96 @@ def _read(path: Path) -> meshio.Mesh:
         ) from error
 
 
-def _text(path: Path) -> list[str]:
-    try:
-        return path.read_text(encoding="utf-8", errors="strict").splitlines()
-    except UnicodeDecodeError:
-        raise SuppleError("bad_case", f"{path} is no text file.") from None
-
-
-def _check_off(path: Path) -> None:
-    """meshio waits for ever where the counts are missing."""
-    words = [word for line in _text(path) for word in line.split("#")[0].split()]
-    if len(words) < 4 or words[0] != "OFF":
-        raise SuppleError(
-            "bad_case", f"{path} cannot be read as a mesh: it must begin with OFF and three counts."
-        )
-
-
-def _check_ply(path: Path) -> None:
-    """As with OFF, without the header's end."""
+def _check_header(path: Path) -> None:
+    """meshio waits for ever where the counts of an OFF file or the end of a PLY header are missing."""
     with open(path, "rb") as file:
-        if b"end_header" not in file.read(1 << 16):
+        start = file.read(1 << 16)
+    if path.suffix.lower() == ".ply" and b"end_header" not in start:
+        raise SuppleError(
+            "bad_case", f"{path} cannot be read as a mesh: its header has no end_header."
+        )
+    if path.suffix.lower() == ".off":
+        words = [word for line in start.splitlines() for word in line.split(b"#")[0].split()]
+        if len(words) < 4 or words[0] != b"OFF":
             raise SuppleError(
-                "bad_case", f"{path} cannot be read as a mesh: its header has no end_header."
+                "bad_case",
+                f"{path} cannot be read as a mesh: it must begin with OFF and three counts.",
             )
 
 
-def _plain_obj(path: Path) -> str:
-    """The vertices and faces alone. meshio takes texture coordinates for values at vertices, and
-    knows no indices that count backwards."""
-    lines, count = [], 0
-    for number, line in enumerate(_text(path), start=1):
-        words = line.split()
-        if not words:
-            continue
-        if words[0] == "v":
-            count += 1
-            lines.append(" ".join(words[:4]))
-        elif words[0] == "f":
-            lines.append("f " + " ".join(_corner(w, 0, count, path, number) for w in words[1:]))
-    if not lines:
-        raise SuppleError("bad_case", f"{path} has no vertices.")
-    return "\n".join(lines) + "\n"
+def _fans(polygons: NDArray | list[list[int]]) -> NDArray[np.int64]:
+    """(m, 3) triangles from the first corner of each polygon."""
+    if isinstance(polygons, np.ndarray):
+        columns = [polygons[:, [0, i, i + 1]] for i in range(1, polygons.shape[1] - 1)]
+        return np.concatenate(columns) if columns else np.zeros((0, 3), dtype=np.int64)
+    found = [(p[0], p[i], p[i + 1]) for p in polygons for i in range(1, len(p) - 1)]
+    return np.array(found, dtype=np.int64).reshape(-1, 3)
 
 
-def _corner(word: str, part: int, count: int, path: Path, line: int) -> str:
-    """A corner's index into `count` elements read so far, from 1."""
-    parts = word.split("/")
-    try:
-        index = int(parts[part])
-    except (ValueError, IndexError):
-        raise SuppleError(
-            "bad_case", f"{path}, line {line}: '{word}' is no corner of a face."
-        ) from None
-    return str(index + count + 1 if index < 0 else index)
+def _whole(path: Path, faces: NDArray) -> NDArray[np.int32]:
+    if faces.size and (faces.max() >= 2**31 or faces.min() < -(2**31)):
+        raise SuppleError("bad_case", f"{path} has faces with indices beyond 2**31.")
+    return faces.astype(np.int32)
 
 
-def _obj_uvs(path: Path) -> NDArray[np.float64] | None:
+@dataclass
+class _Obj:
+    vertices: NDArray[np.float64]
+    uvs: NDArray[np.float64]
+    corners: list[list[int]]  # of each face, 0-based
+    uv_corners: list[list[int]]  # -1 where a corner has none
+
+
+def _read_obj(path: Path) -> _Obj:
+    """Vertices, faces and texture coordinates. Not by meshio, which takes texture coordinates for
+    values at vertices and knows no indices that count backwards."""
+    if not path.is_file():
+        raise SuppleError("bad_case", f"There is no file {path}.")
+    content = path.read_bytes()
+    if b"\0" in content:
+        raise SuppleError("bad_case", f"{path} is no text file.")
+    vertices: list[list[float]] = []
     uvs: list[list[float]] = []
-    runs: list[list[list[int]]] = []
-    for number, line in enumerate(_text(path), start=1):
+    corners: list[list[int]] = []
+    uv_corners: list[list[int]] = []
+    for number, line in enumerate(content.removeprefix(b"\xef\xbb\xbf").splitlines(), start=1):
         words = line.split()
-        if words and words[0] == "vt":
-            try:
-                uvs.append([float(word) for word in (*words[1:3], "0")[:2]])
-            except ValueError:
-                raise SuppleError(
-                    "bad_case", f"{path}, line {number}: '{line}' is no texture coordinate."
-                ) from None
-        elif words and words[0] == "f":
-            if any(w.count("/") == 0 or not w.split("/")[1] for w in words[1:]):
-                return None
-            corners = [int(_corner(w, 1, len(uvs), path, number)) - 1 for w in words[1:]]
-            if min(corners) < 0 or max(corners) >= len(uvs):
-                raise SuppleError(
-                    "bad_case",
-                    f"{path}, line {number}: texture coordinate {max(corners) + 1} of {len(uvs)}.",
+        kind = words[0] if words else b""
+        try:
+            if kind == b"v":
+                vertices.append([float(words[1]), float(words[2]), float(words[3])])
+            elif kind == b"vt":
+                uvs.append([float(words[1]), float(words[2]) if len(words) > 2 else 0.0])
+            elif kind == b"f":
+                parts = [word.split(b"/") for word in words[1:]]
+                corners.append([_index(part[0], len(vertices)) for part in parts])
+                uv_corners.append(
+                    [_index(p[1], len(uvs), len(uvs)) if len(p) > 1 and p[1] else -1 for p in parts]
                 )
-            if not runs or len(runs[-1][0]) != len(corners):
-                runs.append([])
-            runs[-1].append(corners)
-    triangles: list[list[int]] = []
-    # In the order of `read_mesh`: meshio has a block for each run of faces of one size.
-    for run in runs:
-        for i in range(1, len(run[0]) - 1):
-            triangles += [[face[0], face[i], face[i + 1]] for face in run]
-    return np.array(uvs)[np.array(triangles)] if triangles else None
+        except (ValueError, IndexError):
+            text = line.decode(errors="replace")[:60]
+            raise SuppleError(
+                "bad_case", f"{path}, line {number}: '{text}' makes no sense."
+            ) from None
+    if not vertices:
+        raise SuppleError("bad_case", f"{path} has no vertices.")
+    return _Obj(np.array(vertices), np.array(uvs).reshape(-1, 2), corners, uv_corners)
 
 
-def _vertex_uvs(path: Path, faces: NDArray[np.int32]) -> NDArray[np.float64] | None:
+def _index(word: bytes, count: int, most: int = 2**31) -> int:
+    """0-based, of one from 1 or, below 0, backwards from the last of `count` so far."""
+    index = int(word)
+    if index == 0 or index > most:
+        raise ValueError(word)
+    return index - 1 if index > 0 else count + index
+
+
+def _vertex_uvs(path: Path) -> NDArray[np.float64] | None:
     mesh = _read(path)
     for names in (("texture",), ("uv",), ("st",), ("u", "v"), ("s", "t")):
         if all(name in mesh.point_data for name in names):
             columns = [np.asarray(mesh.point_data[name], dtype=np.float64) for name in names]
             values = np.column_stack(columns)
             if values.shape[1] >= 2 and len(values) == len(mesh.points):
-                return values[:, :2][faces]
+                return values[:, :2]
     return None

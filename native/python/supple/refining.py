@@ -31,8 +31,9 @@ class RefineResult:
             not asked for.
         backward_surface_map: SurfaceMap to points on the source's faces; None likewise.
         notes: where the two meshes differ in what a map can't respect.
-        report: rounds, eigenfunctions (of the last round), network (whether it was used), and the
-            milliseconds of each stage.
+        report: rounds, eigenfunctions (of the last round), network (whether it was used),
+            bounded_faces (that the network would have stretched too far, as where the map is torn;
+            0 on good maps), and the milliseconds of each stage.
     """
 
     point_map: NDArray[np.int32]

@@ -25,8 +25,8 @@ namespace {
 // progress.
 constexpr Eigen::Index kGroups = 12, kTimesBetweenReports = 2;
 constexpr float kFar = 4.0F;  // beyond all rows, whose norms are at most 1
-// RowTiles that are looked into before the others, the most promising first.
-constexpr int kAhead = 16;
+// Tiles that are looked into before the others, the most promising first.
+constexpr int kFirst = 16;
 // Rows of so many numbers or more are looked at in two steps.
 constexpr Eigen::Index kLong = 48;
 
@@ -142,7 +142,7 @@ class Search {
           std::sqrt(std::max(square, 0.0F)) - middles_.radii[static_cast<size_t>(t)];
     }
     std::vector<int> tiles = in_order(points_.count);
-    const auto ahead = tiles.begin() + std::min<Eigen::Index>(kAhead, points_.count);
+    const auto ahead = tiles.begin() + std::min<Eigen::Index>(kFirst, points_.count);
     std::partial_sort(tiles.begin(), ahead, tiles.end(), [&](int a, int b) {
       const float x = least[static_cast<size_t>(a)], y = least[static_cast<size_t>(b)];
       return x < y || (x == y && a < b);
@@ -221,7 +221,7 @@ Eigen::VectorXi nearest_rows(const ConstTallBlock<double>& queries,
   progress.report(0.0);
   const double size = std::max(query_size, point_size);
   const Search search(queries, points, size > 0.0 ? 1.0 / size : 1.0);
-  Eigen::VectorXi nearest(queries.rows());
+  Eigen::VectorXi nearest = Eigen::VectorXi::Zero(queries.rows());
   const Eigen::Index blocks = (search.groups() + kGroups - 1) / kGroups;
   const int threads = omp_in_parallel() ? 1 : omp_get_max_threads();
   const Eigen::Index together = kTimesBetweenReports * threads;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "supple/core/simd.h"
 
@@ -14,9 +15,9 @@ constexpr int kAhead = 8;
 /// Asks for some bytes to be read into the cache. They must belong to one array.
 SUPPLE_INLINE void prefetch(const void* begin, size_t bytes) {
   constexpr size_t kLine = 64;
-  const auto* const first = static_cast<const char*>(begin);
-  for (size_t i = 0; i < bytes; i += kLine) {
-    __builtin_prefetch(first + i);
+  const auto first = reinterpret_cast<uintptr_t>(begin);
+  for (uintptr_t line = first / kLine * kLine; line < first + bytes; line += kLine) {
+    __builtin_prefetch(reinterpret_cast<const void*>(line));
   }
 }
 

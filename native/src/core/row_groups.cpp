@@ -44,14 +44,14 @@ std::vector<int> grouped_rows(const ConstTallBlock<double>& rows, Eigen::Index s
   std::vector<int> order(static_cast<size_t>(rows.rows()));
   std::iota(order.begin(), order.end(), 0);
   const Eigen::Index numbers = std::min(kNumbers, rows.cols());
-  if (numbers == 0) {
+  if (numbers == 0 || rows.rows() == 0) {
     return order;
   }
   const double largest = rows.leftCols(numbers).cwiseAbs().maxCoeff();
   Halving halve{{rows.rows(), numbers}, size};
   for (Eigen::Index j = 0; j < numbers; ++j) {
     const double weight =
-        (largest > 0.0 ? 1.0 / largest : 1.0) / std::sqrt(1.0 + static_cast<double>(j));
+        (largest > 1e-300 ? 1.0 / largest : 1.0) / std::sqrt(1.0 + static_cast<double>(j));
     halve.rows.col(j) = (weight * rows.col(j)).cast<float>();
   }
   halve(order.data(), order.data() + order.size());

@@ -37,7 +37,7 @@ struct Layout {
 ///   E = sum c (Y - C), F = sum c' (Y - C), D = sum c'' (Y Y^T - I)
 /// and the sums of c, of c', and the coefficients of X_0 (two fields), so that
 ///   J - L = E - e (L - C) + P (F - f (L - C)) + D L + x (X_0 - L) + x' P (X_0 - L).
-/// Two lines of the cache in single precision: faces read three of these each.
+/// 128 bytes in single precision: faces read three of these each.
 template <class Scalar>
 struct Combination {
   Scalar along[kPadded];   // E; then e, f, x, x' at 9..12

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the commands share: the terminal, progress, and writing files."""
+"""What the commands share: the terminal and progress."""
 
 import sys
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from typing import TypeVar
 
 import rich.console
@@ -82,6 +83,11 @@ def watched(label: str, work: Callable[[supple.Progress], _Result], note: object
     if "error" in outcome:
         raise outcome["error"]
     return outcome["result"]
+
+
+def model_file(name: str) -> Path | None:
+    """The file of a model, None for a shipped one by its name."""
+    return Path(name) if Path(name).suffix == ".safetensors" else None
 
 
 def print_error(error: object) -> None:

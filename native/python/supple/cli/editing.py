@@ -16,7 +16,7 @@ import typer
 import supple
 
 from ..cases import EditCase, read_case
-from ..files import write_whole
+from ..files import check_outputs, write_whole
 from ..mesh_files import write_mesh
 from .console import print_error, watched
 
@@ -59,6 +59,11 @@ def edit(
     how: dict[str, object] = {"mode": mode.value} if stiffness is None else {"stiffness": stiffness}
     how["keep_volume"] = keep_volume
     try:
+        read = [file for folder in cases for file in Path(folder).glob("*")]
+        written = [out / f"{Path(folder).resolve().name}.obj" for folder in dict.fromkeys(cases)]
+        check_outputs([report], read)
+        for path in written:
+            check_outputs([path], read)
         chosen = supple.load_model(model) if network else None
         out.mkdir(parents=True, exist_ok=True)
     except (supple.SuppleError, OSError) as error:
@@ -85,7 +90,11 @@ def edit(
             "model": chosen.metadata if chosen else None,
             "version": supple.__version__,
         }
-        write_whole(report, json.dumps(content, indent=1))
+        try:
+            write_whole(report, json.dumps(content, indent=1))
+        except supple.SuppleError as error:
+            errors["report"] = str(error)
+            print_error(error)
     rich.console.Console().print(_table(figures))
     if errors:
         raise typer.Exit(1)

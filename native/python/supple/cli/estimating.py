@@ -14,7 +14,7 @@ import supple
 
 from ..files import check_outputs, write_whole
 from ..mesh_files import check_ending, read_mesh, write_mesh
-from .console import print_error, watched
+from .console import model_file, print_error, watched
 from .editing import Mode
 
 # The ways that stand beside each other in every report, and what they mean to Editor.solve.
@@ -39,7 +39,7 @@ def estimate(
 ) -> None:
     """Estimate a motion from a few handles where it is largest, and measure what that misses."""
     try:
-        check_outputs((out, report), (source, target, model))
+        check_outputs((out, report), (source, target, model_file(model)))
         check_ending(out)
         vertices, faces = read_mesh(source)
         truth, _ = read_mesh(target)

@@ -42,7 +42,7 @@ def evaluate_refine(
     Seconds are of a warm refinement: meshes prepared, factors ready.
     """
     try:
-        _check_report(report)
+        _check_report(report, folder)
         chosen = evaluation.methods(supple.load_model(model))
         match_set = _first_pairs(read_match_set(folder), pairs)
         result = _evaluated(match_set, chosen, runs=runs, cache=cache)
@@ -79,7 +79,7 @@ def evaluate_match(
     Seconds are of all but the preparation of meshes: adaptation to the pair is counted.
     """
     try:
-        _check_report(report)
+        _check_report(report, folder)
         networks = supple.load_match_model(model)
         names = list(dict.fromkeys(name.strip() for name in configs.split(",")))
         chosen = evaluation.match_methods(networks, names, epochs=epochs)
@@ -111,9 +111,9 @@ def _evaluated(match_set: MatchSet, chosen: list[evaluation.Method], **options: 
         ).run()
 
 
-def _check_report(report: Path | None) -> None:
+def _check_report(report: Path | None, folder: Path) -> None:
     if report is not None:
-        check_outputs((report, report.with_suffix(".md")))
+        check_outputs((report, report.with_suffix(".md")), folder.rglob("*"))
 
 
 def _write(result: dict, report: Path | None) -> None:

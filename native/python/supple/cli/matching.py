@@ -15,7 +15,7 @@ import supple
 from ..files import check_outputs, write_whole
 from ..matching import CONFIGURATIONS, EPOCHS
 from ..mesh_files import check_ending, write_mesh
-from .console import Latest, epoch_text, peak_mebibytes, print_error, watched
+from .console import Latest, epoch_text, model_file, peak_mebibytes, print_error, watched
 from .maps import prepared, print_notes, write_map, written
 
 Config = StrEnum("Config", {name: name for name in CONFIGURATIONS})
@@ -47,7 +47,7 @@ def match(
 ) -> None:
     """Map one mesh to another from their shapes alone, with features that adapt to the pair."""
     try:
-        check_outputs((out, deformed, save_model, report), (source, target, model))
+        check_outputs((out, deformed, save_model, report), (source, target, model_file(model)))
         if deformed is not None:
             check_ending(deformed)
         networks = supple.load_match_model(model)

@@ -13,7 +13,7 @@ import supple
 from ..files import check_outputs
 from ..match_sets import is_index, read_indices, read_text
 from ..mesh_files import read_uvs
-from .console import console, print_error, watched
+from .console import console, model_file, print_error, watched
 from .maps import prepared, print_notes, write_map, written
 
 FAR_LANDMARK = 0.03
@@ -57,7 +57,7 @@ def refine(
     try:
         if sum(given is not None for given in (first_map, landmarks, start)) > 1:
             raise supple.SuppleError("bad_option", "Give one of --map, --landmarks and --start.")
-        check_outputs((out,), (source, target, first_map, landmarks, model))
+        check_outputs((out,), (source, target, first_map, landmarks, model_file(model)))
         meshes = prepared((source, target), cache=cache)
         initial = _initial(meshes, (source, target), first_map, landmarks, start)
         refiner = supple.Refiner(*meshes, model=model if network else None)

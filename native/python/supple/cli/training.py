@@ -16,7 +16,15 @@ import supple
 from ..files import check_outputs, write_whole
 from ..matching import TERMS, Epoch
 from ..shape_folders import FolderShape, read_shapes
-from .console import Latest, epoch_text, peak_mebibytes, print_error, progress_bar, watched
+from .console import (
+    Latest,
+    epoch_text,
+    model_file,
+    peak_mebibytes,
+    print_error,
+    progress_bar,
+    watched,
+)
 from .matching import Config
 
 
@@ -84,8 +92,13 @@ def train_unsupervised(
                 f"{guided_epochs} guided epochs of {epochs}: --guided-epochs must be no more than "
                 "--epochs.",
             )
-        check_outputs((out,), () if start == "none" else (start,))
+        metrics, curve = out.with_suffix(".metrics.json"), out.with_suffix(".loss.csv")
+        check_outputs((out, metrics, curve), (model_file(start),))
         kept = checkpoint or out.with_suffix(".checkpoint")
+        if kept.exists() and not kept.is_dir():
+            raise supple.SuppleError(
+                "bad_option", f"{kept} is no folder; name another for --checkpoint."
+            )
         metadata = {
             "training": f"unsupervised, {config.value}, {epochs} epochs",
             "seed": str(seed),
@@ -130,7 +143,6 @@ def train_unsupervised(
             "peak_mebibytes": peak_mebibytes(),
             "metadata": result.model.metadata,
         }
-        metrics, curve = out.with_suffix(".metrics.json"), out.with_suffix(".loss.csv")
         write_whole(metrics, json.dumps(content, indent=1) + "\n")
         write_whole(curve, _curve(result.history))
     except (supple.SuppleError, OSError) as error:
