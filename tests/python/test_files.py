@@ -84,7 +84,7 @@ def test_commands_check_their_outputs_first(tmp_path):
     cases = {
         "is read": ["refine", mesh, mesh, "--out", mesh],
         "two outputs": ["match", mesh, mesh, "--out", tmp_path / "o", "--report", tmp_path / "o"],
-        "must end in one of": ["match", mesh, mesh, "--out", "o", "--deformed", tmp_path / "d.foo"],
+        "must end in .obj": ["match", mesh, mesh, "--out", "o", "--deformed", tmp_path / "d.foo"],
         "--map, --landmarks and --start": [
             *("refine", mesh, mesh, "--out", tmp_path / "o", "--map", mesh, "--start", "nearest")
         ],

@@ -116,7 +116,7 @@ def _read(path: Path) -> meshio.Mesh:
 
 
 def _check_header(path: Path) -> None:
-    """meshio waits for ever where the counts of an OFF file or the end of a PLY header are missing."""
+    """meshio waits for ever without the counts of an OFF file or the end of a PLY header."""
     with open(path, "rb") as file:
         start = file.read(1 << 16)
     if path.suffix.lower() == ".ply" and b"end_header" not in start:
