@@ -33,6 +33,15 @@ def run(*arguments: object):
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
+def grid_of(across: int, along: int) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 2) places in the unit square and (m, 3) triangles."""
+    x, y = np.meshgrid(np.linspace(0, 1, across), np.linspace(0, 1, along))
+    at = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = (part.ravel() for part in (at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]))
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    return np.column_stack([x.ravel(), y.ravel()]), faces
+
+
 # --- writing --------------------------------------------------------------------------------------
 
 
@@ -184,12 +193,9 @@ def test_only_whole_numbers_are_indices(tmp_path, word):
 
 def test_nearest_is_as_they_lie_and_aligned_after_laying_on(tmp_path):
     rng = np.random.default_rng(0)
-    grid = np.stack(np.meshgrid(np.linspace(0, 2, 24), np.linspace(0, 1, 12)), 2).reshape(-1, 2)
-    height = 0.3 * np.sin(3 * grid[:, 0]) * grid[:, 1] + 0.4 * grid[:, 0] ** 2
-    vertices = np.column_stack([grid, height])
-    at = np.arange(288).reshape(12, 24)
-    a, b, c, d = (part.ravel() for part in (at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]))
-    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    grid, faces = grid_of(24, 12)
+    x, y = grid.T * [[2.0], [1.0]]
+    vertices = np.column_stack([x, y, 0.3 * np.sin(3 * x) * y + 0.4 * x**2])
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
     mesh_files.write_mesh(tmp_path / "a.obj", vertices, faces)
@@ -223,11 +229,9 @@ def test_landmarks_are_on_the_surface(pair_of_grids):
 @pytest.fixture
 def pair_of_grids():
     """A wavy square with one vertex more than its faces have, twice."""
-    x, y = np.meshgrid(np.linspace(0, 1, 12), np.linspace(0, 1, 12))
-    at = np.arange(144).reshape(12, 12)
-    a, b, c, d = (part.ravel() for part in (at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]))
-    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    vertices = np.stack([x, y, 0.2 * np.sin(5 * x) * y], 2).reshape(-1, 3)
+    grid, faces = grid_of(12, 12)
+    x, y = grid.T
+    vertices = np.column_stack([x, y, 0.2 * np.sin(5 * x) * y])
     vertices = np.concatenate([vertices, [[3.0, 3.0, 3.0]]])
     return [supple.PreparedMesh(vertices, faces, cache=False) for _ in range(2)]
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _native, map_metrics
+from . import map_metrics
 from .errors import SuppleError
 from .initial_maps import automatic_map, zoomout_map
 from .match_model import MatchModel
 from .match_sets import MatchSet, MatchShape
-from .matching import CONFIGURATIONS, EPOCHS, Epoch, Matcher, MatchResult, configure
+from .matching import CONFIGURATIONS, EPOCHS, Epoch, Matcher, MatchResult
 from .mesh import PreparedMesh
 from .model import Model
 from .refining import Refiner
@@ -102,7 +102,6 @@ def match_methods(
                 f"'{config}' is no way to match. Use {', '.join((NO_NETWORK, *CONFIGURATIONS))}.",
             )
         if config not in rows:
-            configure(_native.JointTrainOptions(), config)
             rows[config] = Method(config, _features(model, config, epochs), refines=False)
     return [
         Method("automatic", _automatic, refines=False),

@@ -6,9 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "supple/core/dense.h"
 #include "supple/core/error.h"
-#include "supple/core/nearest_rows.h"
 #include "supple/core/tall.h"
 #include "supple/spectral/map_fit.h"
 
@@ -96,9 +94,7 @@ Eigen::VectorXi point_map(const Eigenbasis& source, const Eigenbasis& target,
   check_count("source", source, map.rows());
   check_count("target", target, map.cols());
   const double scale = std::sqrt(target.mass.sum() / source.mass.sum());
-  RowMatrix<double> moved = RowMatrix<double>::Zero(target.functions.rows(), map.rows());
-  add_tall_product<double>(scale, {target.functions.leftCols(map.cols())}, map.transpose(), moved);
-  return nearest_rows(source.functions.leftCols(map.rows()), moved, progress);
+  return nearest_images(source.functions, target.functions, map, scale, progress);
 }
 
 Zoomout zoomout(const Eigenbasis& source, const Eigenbasis& target, const Eigen::VectorXi& initial,

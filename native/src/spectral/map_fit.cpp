@@ -98,11 +98,16 @@ SampledFunctions sampled_functions(const Eigenbasis& basis, const Eigen::VectorX
           Eigen::VectorXd::Constant(vertices.size(), 1.0 / static_cast<double>(vertices.size()))};
 }
 
+Eigen::VectorXi nearest_images(const RowMatrix<double>& source, const RowMatrix<double>& target,
+                               const RowMatrix<double>& map, double scale, ProgressRange progress) {
+  RowMatrix<double> images = RowMatrix<double>::Zero(target.rows(), map.rows());
+  add_tall_product<double>(scale, {target.leftCols(map.cols())}, map.transpose(), images);
+  return nearest_rows(source.leftCols(map.rows()), images, progress);
+}
+
 Eigen::VectorXi sampled_point_map(const SampledFunctions& source, const SampledFunctions& target,
                                   const RowMatrix<double>& map) {
-  RowMatrix<double> moved = RowMatrix<double>::Zero(target.functions.rows(), map.rows());
-  add_tall_product<double>(1.0, {target.functions.leftCols(map.cols())}, map.transpose(), moved);
-  return nearest_rows(source.functions.leftCols(map.rows()), moved);
+  return nearest_images(source.functions, target.functions, map, 1.0);
 }
 
 RowMatrix<double> sampled_functional_map(const SampledFunctions& source,

@@ -45,6 +45,12 @@ struct SampledFunctions {
 SampledFunctions sampled_functions(const Eigenbasis& basis, const Eigen::VectorXi& vertices,
                                    Eigen::Index count);
 
+/// For row i of the first k_s columns of `source`, the nearest row of scale T C^T, T the first k_t
+/// columns of `target`; C: k_s x k_t. Errors: those of `nearest_rows`.
+Eigen::VectorXi nearest_images(const RowMatrix<double>& source, const RowMatrix<double>& target,
+                               const RowMatrix<double>& map, double scale,
+                               ProgressRange progress = {});
+
 /// p: the row of the target that is nearest to each row of the source under C (k_s x k_t).
 Eigen::VectorXi sampled_point_map(const SampledFunctions& source, const SampledFunctions& target,
                                   const RowMatrix<double>& map);

@@ -87,7 +87,8 @@ def watched(label: str, work: Callable[[supple.Progress], _Result], note: object
 
 def model_file(name: str) -> Path | None:
     """The file of a model, None for a shipped one by its name."""
-    return Path(name) if Path(name).suffix == ".safetensors" else None
+    shipped = (*supple.shipped_models(), *supple.shipped_match_models())
+    return None if name in shipped else Path(name)
 
 
 def print_error(error: object) -> None:

@@ -60,10 +60,8 @@ def edit(
     how["keep_volume"] = keep_volume
     try:
         read = [file for folder in cases for file in Path(folder).glob("*")]
-        written = [out / f"{Path(folder).resolve().name}.obj" for folder in dict.fromkeys(cases)]
-        check_outputs([report], read)
-        for path in written:
-            check_outputs([path], read)
+        written = {out / f"{Path(folder).resolve().name}.obj" for folder in cases}
+        check_outputs([report, *written], read)
         chosen = supple.load_model(model) if network else None
         out.mkdir(parents=True, exist_ok=True)
     except (supple.SuppleError, OSError) as error:

@@ -59,12 +59,13 @@ def refine(
             raise supple.SuppleError("bad_option", "Give one of --map, --landmarks and --start.")
         check_outputs((out,), (source, target, first_map, landmarks, model_file(model)))
         meshes = prepared((source, target), cache=cache)
-        initial = _initial(meshes, (source, target), first_map, landmarks, start)
+        pairs = None if landmarks is None else _read_landmarks(landmarks)
+        initial = _initial(meshes, (source, target), first_map, pairs, start)
         refiner = supple.Refiner(*meshes, model=model if network else None)
         result = watched("refining", lambda p: refiner.refine(initial, progress=p))
         print_notes(refiner.notes)
-        if landmarks is not None:
-            _note_moved(meshes[1], _read_landmarks(landmarks), result.point_map)
+        if pairs is not None:
+            _note_moved(meshes[1], pairs, result.point_map)
         score = supple.map_score(*meshes, result.point_map)
         write_map(out, result.point_map)
     except (supple.SuppleError, OSError) as error:
@@ -77,7 +78,7 @@ def _initial(
     meshes: list[supple.PreparedMesh],
     paths: tuple[Path, Path],
     first_map: Path | None,
-    landmarks: Path | None,
+    pairs: np.ndarray | None,
     start: Start | None,
 ) -> np.ndarray:
     """The map to refine; what is to be said of it is printed."""
@@ -89,8 +90,7 @@ def _initial(
                 "probably exchanged"
             )
         return point_map
-    if landmarks is not None:
-        pairs = _read_landmarks(landmarks)
+    if pairs is not None:
         found = watched("landmarks", lambda p: supple.landmark_map(*meshes, pairs, progress=p))
     elif start in (None, Start.automatic):
         found = watched("first map", lambda p: supple.automatic_map(*meshes, progress=p))
