@@ -116,8 +116,8 @@ class CholmodFactor : public Factor {
     const Eigen::Index columns = rhs.cols();
     const int threads = omp_in_parallel() ? 1 : omp_get_max_threads();
     // Few columns share the tree, many are shared out.
-    return columns <= kPanelWidths[0] && !parts_.top_rows.empty()
-               ? solve_by_parts<Scalar>(rhs, part, view)
+    return columns <= kPanelWidths[1] && !parts_.top_rows.empty()
+               ? solve_by_parts<Scalar>(rhs, part, view, panel_width(columns, 1))
                : solve_by_columns<Scalar>(rhs, part, view, panel_width(columns, threads));
   }
 
@@ -181,26 +181,26 @@ class CholmodFactor : public Factor {
   // parts add to the top is summed in their order.
   template <class Scalar>
   RowMatrix<double> solve_by_parts(const RowMatrix<double>& rhs, Substitution part,
-                                   const SupernodalFactor& view) const {
-    constexpr int kWidth = kPanelWidths[0], kParts = SupernodeParts::kParts;
+                                   const SupernodalFactor& view, int width) const {
+    constexpr int kParts = SupernodeParts::kParts;
     const Eigen::Index n = rhs.rows(), columns = rhs.cols();
     const bool ordered_in = part == Substitution::backward;
     const bool ordered_out = part == Substitution::forward;
-    const size_t size = static_cast<size_t>(n) * kWidth;
+    const auto row = static_cast<size_t>(width);
     RowMatrix<double> solution(n, columns);
     std::vector<AlignedArray<Scalar>> panels;
     for (int p = 0; p <= kParts; ++p) {
-      panels.push_back(aligned_array<Scalar>(size));
+      panels.push_back(aligned_array<Scalar>(static_cast<size_t>(n) * row));
     }
     Scalar* const top = panels.back().get();
     const auto row_in = [&](Eigen::Index i, Scalar* panel) {
       const double* const from = rhs.data() + place(i, ordered_in) * columns;
-      std::transform(from, from + columns, panel + i * kWidth,
+      std::transform(from, from + columns, panel + i * width,
                      [](double x) { return static_cast<Scalar>(x); });
-      std::fill(panel + i * kWidth + columns, panel + (i + 1) * kWidth, Scalar(0));
+      std::fill(panel + i * width + columns, panel + (i + 1) * width, Scalar(0));
     };
     const auto row_out = [&](Eigen::Index i, const Scalar* panel) {
-      const Scalar* const from = panel + i * kWidth;
+      const Scalar* const from = panel + i * width;
       std::copy(from, from + columns, solution.data() + place(i, ordered_out) * columns);
     };
     const auto for_rows = [&](int p, const auto& visit) {
@@ -214,33 +214,33 @@ class CholmodFactor : public Factor {
     for (int p = 0; p < kParts; ++p) {
       Scalar* const panel = panels[static_cast<size_t>(p)].get();
       for (const int i : parts_.top_rows) {
-        std::fill(panel + static_cast<size_t>(i) * kWidth,
-                  panel + static_cast<size_t>(i + 1) * kWidth, Scalar(0));
+        std::fill(panel + static_cast<size_t>(i) * row, panel + static_cast<size_t>(i + 1) * row,
+                  Scalar(0));
       }
       for_rows(p, [&](Eigen::Index i) { row_in(i, panel); });
       if (part != Substitution::backward) {
         for (const SupernodeRange& range : parts_.parts[p]) {
-          forward_panel(view, range, panel, kWidth);
+          forward_panel(view, range, panel, width);
         }
       }
     }
     for (const int i : parts_.top_rows) {
       row_in(i, top);
       for (int p = 0; p < kParts; ++p) {
-        for (int c = 0; c < kWidth; ++c) {
-          const size_t at = static_cast<size_t>(i) * kWidth + static_cast<size_t>(c);
+        for (int c = 0; c < width; ++c) {
+          const size_t at = static_cast<size_t>(i) * row + static_cast<size_t>(c);
           top[at] += panels[static_cast<size_t>(p)][at];
         }
       }
     }
     if (part != Substitution::backward) {
       for (const SupernodeRange& range : parts_.top) {
-        forward_panel(view, range, top, kWidth);
+        forward_panel(view, range, top, width);
       }
     }
     if (part != Substitution::forward) {
       for (auto range = parts_.top.rbegin(); range != parts_.top.rend(); ++range) {
-        backward_panel(view, *range, top, kWidth);
+        backward_panel(view, *range, top, width);
       }
     }
     for (const int i : parts_.top_rows) {
@@ -251,12 +251,11 @@ class CholmodFactor : public Factor {
       Scalar* const panel = panels[static_cast<size_t>(p)].get();
       if (part != Substitution::forward) {
         for (const int i : parts_.top_rows) {
-          std::copy(top + static_cast<size_t>(i) * kWidth,
-                    top + static_cast<size_t>(i + 1) * kWidth,
-                    panel + static_cast<size_t>(i) * kWidth);
+          std::copy(top + static_cast<size_t>(i) * row, top + static_cast<size_t>(i + 1) * row,
+                    panel + static_cast<size_t>(i) * row);
         }
         for (auto range = parts_.parts[p].rbegin(); range != parts_.parts[p].rend(); ++range) {
-          backward_panel(view, *range, panel, kWidth);
+          backward_panel(view, *range, panel, width);
         }
       }
       for_rows(p, [&](Eigen::Index i) { row_out(i, panel); });

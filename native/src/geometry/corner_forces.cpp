@@ -5,26 +5,14 @@
 
 namespace supple {
 
-CornerForces::CornerForces(const SurfaceOperators& operators)
+template <class Scalar>
+CornerForces<Scalar>::CornerForces(const SurfaceOperators& operators)
     : operators_(operators),
       forces_(
           std::make_unique_for_overwrite<Force[]>(static_cast<size_t>(operators.faces.rows()))) {}
 
-void CornerForces::set(Eigen::Index first, Eigen::Index count, const double* matrices) {
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const double* const x = matrices + 9 * i;
-    // Columns 0 and 1 of E^-1 are the gradients of the functions that are 1 at corners 1 and 2.
-    const double* const inverse = operators_.inverse_frames.data() + 9 * (first + i);
-    const double area = operators_.face_areas[first + i];
-    Force& force = forces_[static_cast<size_t>(first + i)];
-    for (int j = 0; j < 3; ++j) {
-      force.one[j] = area * (inverse[0] * x[j] + inverse[3] * x[3 + j] + inverse[6] * x[6 + j]);
-      force.two[j] = area * (inverse[1] * x[j] + inverse[4] * x[3 + j] + inverse[7] * x[6 + j]);
-    }
-  }
-}
-
-Points CornerForces::gathered() const {
+template <class Scalar>
+Points CornerForces<Scalar>::gathered() const {
   const CornerTable& corners = operators_.corners;
   Points result(operators_.vertices.rows(), 3);
   const Eigen::Index n = result.rows();
@@ -47,5 +35,8 @@ Points CornerForces::gathered() const {
   }
   return result;
 }
+
+template class CornerForces<float>;
+template class CornerForces<double>;
 
 }  // namespace supple

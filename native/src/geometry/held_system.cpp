@@ -169,9 +169,10 @@ std::optional<HeldSystem> HeldSystem::changed(const Eigen::VectorXi& held) const
   return result;
 }
 
-Points HeldSystem::solve(const Points& rhs, const Points* held_values, Precision precision) const {
+RowMatrix<double> HeldSystem::solve(RowMatrix<double> rhs, const RowMatrix<double>* held_values,
+                                    Precision precision) const {
   const Factored& base = *factored_;
-  const auto hold = [&](Points& result) {
+  const auto hold = [&](RowMatrix<double>& result) {
     for (Eigen::Index i = 0; i < held_.size(); ++i) {
       if (held_values != nullptr) {
         result.row(held_[i]) = held_values->row(i);
@@ -180,8 +181,8 @@ Points HeldSystem::solve(const Points& rhs, const Points* held_values, Precision
       }
     }
   };
-  RowMatrix<double> load = rhs;
-  RowMatrix<double> kept = RowMatrix<double>::Zero(base.held.size(), 3);
+  RowMatrix<double> kept = RowMatrix<double>::Zero(base.held.size(), rhs.cols());
+  const RowMatrix<double> of_held = rhs(base.held, Eigen::all);
   if (held_values != nullptr) {
     for (Eigen::Index i = 0; i < kept.rows(); ++i) {
       const Eigen::Index from = changes_ == nullptr ? i : changes_->source[i];
@@ -189,20 +190,20 @@ Points HeldSystem::solve(const Points& rhs, const Points* held_values, Precision
         kept.row(i) = held_values->row(from);
       }
     }
-    load.noalias() -= base.coupling * kept;
+    rhs.noalias() -= base.coupling * kept;
   }
   for (const int row : base.held) {
-    load.row(row).setZero();
+    rhs.row(row).setZero();
   }
   if (changes_ == nullptr) {
-    Points result = base.factor.solve(load, precision);
+    RowMatrix<double> result = base.factor.solve(rhs, precision);
     hold(result);
     return result;
   }
   const Changes& changes = *changes_;
   const auto added = static_cast<Eigen::Index>(changes.added.size());
   const auto freed = static_cast<Eigen::Index>(changes.freed.size());
-  RowMatrix<double> half = base.factor.forward(load, precision);
+  RowMatrix<double> half = base.factor.forward(rhs, precision);
   RowMatrix<double> unknown = -(changes.columns.transpose() * half);
   const RowMatrix<double> between = base.among * kept;
   for (Eigen::Index i = 0; i < added && held_values != nullptr; ++i) {
@@ -210,14 +211,13 @@ Points HeldSystem::solve(const Points& rhs, const Points* held_values, Precision
   }
   for (Eigen::Index i = 0; i < freed; ++i) {
     const int place = changes.freed[static_cast<size_t>(i)];
-    unknown.row(added + i) =
-        rhs.row(base.held[place]) - between.row(place) - unknown.row(added + i);
+    unknown.row(added + i) = of_held.row(place) - between.row(place) - unknown.row(added + i);
   }
   if (added + freed > 0) {
     unknown = changes.small.solve(unknown).eval();
   }
   half += changes.columns * unknown;
-  Points result = base.factor.backward(half, precision);
+  RowMatrix<double> result = base.factor.backward(half, precision);
   for (Eigen::Index i = 0; i < freed; ++i) {
     result.row(base.held[changes.freed[static_cast<size_t>(i)]]) = unknown.row(added + i);
   }
@@ -226,11 +226,19 @@ Points HeldSystem::solve(const Points& rhs, const Points* held_values, Precision
 }
 
 Points HeldSystem::solve(const Points& rhs, const Points& held_values) const {
-  return solve(rhs, &held_values, Precision::full);
+  const RowMatrix<double> values = held_values;
+  return solve(rhs, &values, Precision::full);
 }
 
 Points HeldSystem::correction(const Points& residual) const {
   return solve(residual, nullptr, Precision::single);
+}
+
+std::pair<Points, Points> HeldSystem::corrections(const Points& one, const Points& two) const {
+  RowMatrix<double> both(one.rows(), 6);
+  both << one, two;
+  both = solve(std::move(both), nullptr, Precision::single);
+  return {both.leftCols(3), both.rightCols(3)};
 }
 
 Points HeldSystem::solve_backward(const Points& grad) const {

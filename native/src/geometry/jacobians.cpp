@@ -8,7 +8,7 @@
 #include <cmath>
 #include <limits>
 
-#include "supple/core/simd.h"
+#include "rotation_lanes.h"
 
 namespace supple {
 namespace {
@@ -124,89 +124,21 @@ Matrix3 closest_rotation(const Matrix3& j) {
 
 namespace {
 
-// Cofactors of 3x3 matrices, a vector of lanes a number.
-template <class V>
-SUPPLE_INLINE void cofactors(const V* q, V* out) {
-  for (int i = 0; i < 3; ++i) {
-    const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
-    for (int j = 0; j < 3; ++j) {
-      const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
-      out[3 * i + j] = q[3 * i1 + j1] * q[3 * i2 + j2] - q[3 * i1 + j2] * q[3 * i2 + j1];
-    }
-  }
-}
-
-// Newton's iteration on as many matrices at once as a vector has lanes. With singular values s
-// (the last one negative where J is mirrored), J + cofactor(J) has s1 + s2 s3, s2 + s3 s1,
-// s3 + s1 s2 in the same directions, so the same closest rotation, but is far from singular even
-// where J has rank 2: a few steps do, without scaling. What is not there after kSteps gets NaN and
-// is done by itself.
-//
-// Quadratic: a last change below `done` leaves less than rounding. Of what begins below `singular`,
-// rounding would choose the rotation.
-template <class Scalar>
-struct Limits;
-template <>
-struct Limits<double> {
-  static constexpr double done = 1e-15, singular = 1e-6;
-};
-template <>
-struct Limits<float> {
-  static constexpr float done = 1e-8F, singular = 1e-3F;
-};
-
-template <class Scalar, int Bytes>
-SUPPLE_INLINE void newton(const double* from, double* to, Eigen::Index count) {
-  using V = typename Lanes<Scalar, Bytes>::type;
-  using Limit = Limits<Scalar>;
-  constexpr int kLanes = Lanes<Scalar, Bytes>::count;
-  constexpr int kSteps = 9;
-  constexpr Scalar kHalf(0.5);
-  V q[9] = {}, cofactor[9], change{}, square{}, start{};
+// On as many matrices at once as a vector has lanes; what is not there gets NaN.
+template <int Bytes>
+SUPPLE_INLINE void rotations(const double* from, double* to, Eigen::Index count) {
+  constexpr int kLanes = Lanes<double, Bytes>::count;
+  typename Lanes<double, Bytes>::type q[9] = {};
+  bool good[kLanes];
   for (int e = 0; e < 9; ++e) {
     for (int l = 0; l < kLanes; ++l) {
-      q[e][l] = l < count ? static_cast<Scalar>(from[9 * l + e]) : Scalar(e % 4 == 0);
-    }
-    square += q[e] * q[e];
-  }
-  V scale;
-  for (int l = 0; l < kLanes; ++l) {
-    scale[l] = std::sqrt(Scalar(3) / square[l]);
-  }
-  for (int e = 0; e < 9; ++e) {
-    q[e] *= scale;
-  }
-  cofactors(q, cofactor);
-  for (int e = 0; e < 9; ++e) {
-    q[e] = kHalf * (q[e] + cofactor[e]);
-  }
-  for (int step = 0; step < kSteps; ++step) {
-    cofactors(q, cofactor);
-    const V determinant = q[0] * cofactor[0] + q[1] * cofactor[1] + q[2] * cofactor[2];
-    const V half_inverse = kHalf / determinant;
-    start = step == 0 ? determinant : start;
-    change = V{};
-    for (int e = 0; e < 9; ++e) {
-      const V next = kHalf * q[e] + half_inverse * cofactor[e];
-      const V moved = next - q[e];
-      change += moved * moved;
-      q[e] = next;
-    }
-    bool done = true;
-    for (int l = 0; l < kLanes; ++l) {
-      done = done && change[l] < Limit::done;
-    }
-    if (done) {
-      break;
+      q[e][l] = l < count ? from[9 * l + e] : double(e % 4 == 0);
     }
   }
-  cofactors(q, cofactor);
-  const V determinant = q[0] * cofactor[0] + q[1] * cofactor[1] + q[2] * cofactor[2];
+  rotation_lanes<double, Bytes>(q, good);
   for (int l = 0; l < kLanes && l < count; ++l) {
-    const bool good =
-        change[l] < Limit::done && start[l] > Limit::singular && determinant[l] > kHalf;
     for (int e = 0; e < 9; ++e) {
-      to[9 * l + e] = good ? q[e][l] : std::numeric_limits<double>::quiet_NaN();
+      to[9 * l + e] = good[l] ? q[e][l] : std::numeric_limits<double>::quiet_NaN();
     }
   }
 }
@@ -214,56 +146,35 @@ SUPPLE_INLINE void newton(const double* from, double* to, Eigen::Index count) {
 // As many matrices as a kernel takes: the lanes of the widest vector.
 constexpr Eigen::Index kTogether = 8;
 
-SUPPLE_AVX512 void newton_avx512(const double* from, double* to, Eigen::Index count) {
-  newton<double, 64>(from, to, count);
+SUPPLE_AVX512 void rotations_avx512(const double* from, double* to, Eigen::Index count) {
+  rotations<64>(from, to, count);
 }
-SUPPLE_AVX2 void newton_avx2(const double* from, double* to, Eigen::Index count) {
-  newton<double, 32>(from, to, std::min<Eigen::Index>(count, 4));
+SUPPLE_AVX2 void rotations_avx2(const double* from, double* to, Eigen::Index count) {
+  rotations<32>(from, to, std::min<Eigen::Index>(count, 4));
   if (count > 4) {
-    newton<double, 32>(from + 36, to + 36, count - 4);
+    rotations<32>(from + 36, to + 36, count - 4);
   }
 }
-void newton_plain(const double* from, double* to, Eigen::Index count) {
+void rotations_plain(const double* from, double* to, Eigen::Index count) {
   for (Eigen::Index i = 0; i < count; i += 2) {
-    newton<double, 16>(from + 9 * i, to + 9 * i, count - i);
-  }
-}
-SUPPLE_AVX2 void single_newton_avx2(const double* from, double* to, Eigen::Index count) {
-  newton<float, 32>(from, to, count);
-}
-void single_newton_plain(const double* from, double* to, Eigen::Index count) {
-  for (Eigen::Index i = 0; i < count; i += 4) {
-    newton<float, 16>(from + 9 * i, to + 9 * i, count - i);
+    rotations<16>(from + 9 * i, to + 9 * i, count - i);
   }
 }
 
 }  // namespace
 
-void closest_rotations(const double* jacobians, double* rotations, Eigen::Index count,
-                       Precision precision) {
-  static const auto full = best_kernel(&newton_avx512, &newton_avx2, &newton_plain);
-  static const auto single =
-      best_kernel(&single_newton_avx2, &single_newton_avx2, &single_newton_plain);
-  const auto kernel = precision == Precision::single ? single : full;
-  for (Eigen::Index first = 0; first < count; first += kTogether) {
-    const Eigen::Index here = std::min(kTogether, count - first);
-    const double* const from = jacobians + 9 * first;
-    double* const to = rotations + 9 * first;
-    kernel(from, to, here);
-    for (Eigen::Index i = 0; i < here; ++i) {
-      if (std::isnan(to[9 * i])) {
-        Eigen::Map<Matrix3>(to + 9 * i) = closest_rotation(Eigen::Map<const Matrix3>(from + 9 * i));
-      }
-    }
-  }
-}
-
 MatrixField closest_rotations(const MatrixField& jacobians) {
+  static const auto kernel = best_kernel(&rotations_avx512, &rotations_avx2, &rotations_plain);
   MatrixField rotations(jacobians.rows(), 9);
 #pragma omp parallel for schedule(static)
   for (Eigen::Index first = 0; first < jacobians.rows(); first += kTogether) {
-    closest_rotations(jacobians.row(first).data(), rotations.row(first).data(),
-                      std::min(kTogether, jacobians.rows() - first), Precision::full);
+    const Eigen::Index count = std::min(kTogether, jacobians.rows() - first);
+    kernel(jacobians.row(first).data(), rotations.row(first).data(), count);
+    for (Eigen::Index f = first; f < first + count; ++f) {
+      if (std::isnan(rotations(f, 0))) {
+        matrix_at(rotations, f) = closest_rotation(matrix_at(jacobians, f));
+      }
+    }
   }
   return rotations;
 }

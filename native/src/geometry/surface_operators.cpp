@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "supple/geometry/surface_operators.h"
 
-#include <algorithm>
-
 #include "corner_forces.h"
 #include "neighbours.h"
 #include "supple/geometry/jacobians.h"
@@ -59,11 +57,19 @@ MatrixField SurfaceOperators::jacobians_of(const Points& moved) const {
 }
 
 Points SurfaceOperators::divergence_of(const MatrixField& jacobians) const {
-  CornerForces forces(*this);
-  constexpr Eigen::Index kFaces = 512;
+  CornerForces<double> forces(*this);
 #pragma omp parallel for schedule(static)
-  for (Eigen::Index first = 0; first < faces.rows(); first += kFaces) {
-    forces.set(first, std::min(kFaces, faces.rows() - first), jacobians.row(first).data());
+  for (Eigen::Index f = 0; f < faces.rows(); ++f) {
+    const double* const x = jacobians.data() + 9 * f;
+    // Columns 0 and 1 of E^-1 are the gradients of the functions that are 1 at corners 1 and 2.
+    const double* const inverse = inverse_frames.data() + 9 * f;
+    auto& force = forces.at(f);
+    for (int j = 0; j < 3; ++j) {
+      force.one[j] =
+          face_areas[f] * (inverse[0] * x[j] + inverse[3] * x[3 + j] + inverse[6] * x[6 + j]);
+      force.two[j] =
+          face_areas[f] * (inverse[1] * x[j] + inverse[4] * x[3 + j] + inverse[7] * x[6 + j]);
+    }
   }
   return forces.gathered();
 }

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 
+#include "combine_kernel.h"
 #include "core/prefetch.h"
 #include "equivariant_parts.h"
 #include "supple/core/simd.h"
@@ -33,82 +34,6 @@ SUPPLE_INLINE void multiply(const Scalar* a, const Scalar* b, Scalar* out) {
     for (int j = 0; j < 3; ++j) {
       out[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
     }
-  }
-}
-
-// What each thread reads and writes.
-template <class Scalar>
-struct CombineTask {
-  Layout layout;
-  const Scalar* bands;  // rows x (kScaleCount * fields * kPadded)
-  const Scalar* c;      // rows x outputs
-  Eigen::Index rows, outputs;
-  Scalar reference[9], defect[9];  // C, C C^T - I
-  Combination<Scalar>* out;
-};
-
-template <class Scalar>
-SUPPLE_INLINE void combine_body(const CombineTask<Scalar>& task) {
-  const int fields = task.layout.fields;
-  for (Eigen::Index r = 0; r < task.rows; ++r) {
-    const Scalar* const bands = task.bands + r * kScaleCount * fields * kPadded;
-    const Scalar* const c = task.c + r * task.outputs;
-    Scalar along[kPadded] = {}, across[kPadded] = {};
-    Scalar sum(0), normal_sum(0);
-    for (int i = 0; i < fields; ++i) {
-      // sum_s c_s Y_s = sum over bands b of (sum_{s >= b} c_s) Z_b.
-      Scalar plain(0), normal(0);
-      for (int s = kScaleCount - 1; s >= 0; --s) {
-        plain += c[task.layout.smooth(i, s)];
-        normal += c[task.layout.smooth(i, s) + 1];
-        const Scalar* const z = bands + (s * fields + i) * kPadded;
-        for (Eigen::Index e = 0; e < kPadded; ++e) {
-          along[e] += plain * z[e];
-          across[e] += normal * z[e];
-        }
-      }
-      sum += plain;
-      normal_sum += normal;
-    }
-    // Y Y^T - I = (C C^T - I) + (C e^T + e C^T) + e e^T: the middle is linear in e, so its sum is
-    // that of the weighted e; only e e^T, symmetric, is summed scale by scale.
-    Scalar smooth[9] = {}, weighted[9] = {}, square[6] = {}, total(0);
-    for (int s = 0; s < kScaleCount; ++s) {
-      const Scalar* const z = bands + (s * fields + fields - 1) * kPadded;
-      const Scalar d = c[task.layout.defect(s)];
-      total += d;
-      for (int e = 0; e < 9; ++e) {
-        smooth[e] += z[e];
-        weighted[e] += d * smooth[e];
-      }
-      const Scalar *const u = smooth, *const v = smooth + 3, *const w = smooth + 6;
-      square[0] += d * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
-      square[1] += d * (u[0] * v[0] + u[1] * v[1] + u[2] * v[2]);
-      square[2] += d * (u[0] * w[0] + u[1] * w[1] + u[2] * w[2]);
-      square[3] += d * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-      square[4] += d * (v[0] * w[0] + v[1] * w[1] + v[2] * w[2]);
-      square[5] += d * (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
-    }
-    Combination<Scalar>& out = task.out[r];
-    for (Eigen::Index e = 0; e < kPadded; ++e) {
-      out.along[e] = along[e];
-      out.normal[e] = across[e];
-    }
-    for (int i = 0; i < 3; ++i) {
-      for (int j = i; j < 3; ++j) {
-        const int k = kSymmetric[3 * i + j];
-        Scalar mixed(0);
-        for (int e = 0; e < 3; ++e) {
-          mixed += task.reference[3 * i + e] * weighted[3 * j + e] +
-                   weighted[3 * i + e] * task.reference[3 * j + e];
-        }
-        out.normal[kDefect + k] = total * task.defect[3 * i + j] + mixed + square[k];
-      }
-    }
-    out.along[kSum] = sum;
-    out.along[kNormalSum] = normal_sum;
-    out.along[kFirst] = fields > 1 ? c[task.layout.plain(0)] : Scalar(0);
-    out.along[kNormalFirst] = fields > 1 ? c[task.layout.plain(0) + 1] : Scalar(0);
   }
 }
 
@@ -174,9 +99,6 @@ SUPPLE_INLINE void correct_body(const FaceTask<Scalar>& task, Eigen::Index begin
 
 template <class Scalar>
 struct Kernels {
-  SUPPLE_AVX512 static void combine_avx512(const CombineTask<Scalar>& task) { combine_body(task); }
-  SUPPLE_AVX2 static void combine_avx2(const CombineTask<Scalar>& task) { combine_body(task); }
-  static void combine_plain(const CombineTask<Scalar>& task) { combine_body(task); }
   SUPPLE_AVX512 static void correct_avx512(const FaceTask<Scalar>& task, Eigen::Index begin,
                                            Eigen::Index end) {
     correct_body(task, begin, end);
@@ -335,23 +257,13 @@ template <class Scalar>
 Combinations<Scalar> combine_at_vertices(const NetworkContext<Scalar>& context,
                                          const Fields<Scalar>& fields,
                                          const RowMatrix<Scalar>& outputs) {
-  const Reference<Scalar> reference(fields.reference);
-  auto at_vertices = std::make_unique_for_overwrite<Combination<Scalar>[]>(
-      static_cast<size_t>(context.functions.rows()));
-  const auto combine = best_kernel(&Kernels<Scalar>::combine_avx512, &Kernels<Scalar>::combine_avx2,
-                                   &Kernels<Scalar>::combine_plain);
-  for_each_chunk(
-      context, fields, [&](const Bands<Scalar>& bands, Eigen::Index first, Eigen::Index rows) {
-        RowMatrix<Scalar> c = RowMatrix<Scalar>::Zero(rows, outputs.cols());
-        add_tall_product<Scalar>(Scalar(1), {context.functions.middleRows(first, rows)}, outputs,
-                                 c);
-        CombineTask<Scalar> task{
-            {bands.fields()},         bands.at(0, 0, 0), c.data(), rows, outputs.cols(), {}, {},
-            at_vertices.get() + first};
-        std::copy_n(reference.matrix.data(), 9, task.reference);
-        std::copy_n(reference.defect.data(), 9, task.defect);
-        combine(task);
-      });
+  const Eigen::Index n = context.functions.rows();
+  const CombineKernel<Scalar> kernel(context, fields, outputs);
+  auto at_vertices = std::make_unique_for_overwrite<Combination<Scalar>[]>(static_cast<size_t>(n));
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index first = 0; first < n; first += kChunk) {
+    kernel.combine(first, std::min(first + kChunk, n), at_vertices.get());
+  }
   return at_vertices;
 }
 

@@ -57,6 +57,16 @@ TEST_P(PoissonZoo, FreeGivesBackAKnownMap) {
   EXPECT_LT(test::farthest(got, poisson.centred(target)), 1e-9 * test::diagonal(target));
 }
 
+TEST_P(PoissonZoo, TwoCorrectionsAtOnceAreThoseOfEach) {
+  const HeldSystem poisson(operators.laplacian, held);
+  const Points one = operators.laplacian * test::noise(target.rows(), 3, 1),
+               two = operators.laplacian * test::noise(target.rows(), 3, 2);
+  const auto [first, second] = poisson.corrections(one, two);
+  EXPECT_LT(test::farthest(first, poisson.correction(one)), 1e-4);
+  EXPECT_LT(test::farthest(second, poisson.correction(two)), 1e-4);
+  EXPECT_EQ(rows_of(second, held), Points::Zero(held.size(), 3));
+}
+
 TEST_P(PoissonZoo, HeldGivesBackAKnownMap) {
   for (const Backend backend : {Backend::cholmod, Backend::eigen}) {
     if (!SparseCholesky::available(backend)) {

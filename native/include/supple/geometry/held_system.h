@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "supple/core/types.h"
 #include "supple/geometry/sparse_cholesky.h"
@@ -39,6 +40,8 @@ class HeldSystem {
   /// of what is added, whatever X is, so a solve that is taken up again and again, as rounds of an
   /// edit do, loses nothing and reads half of the memory.
   Points correction(const Points& residual) const;
+  /// The same of two residuals, in little more time than of one: the factor is read once.
+  std::pair<Points, Points> corrections(const Points& one, const Points& two) const;
   /// Gradient with respect to `rhs` (n x 3, held rows 0) from the gradient with respect to `solve`.
   Points solve_backward(const Points& grad) const;
 
@@ -46,8 +49,9 @@ class HeldSystem {
   struct Factored;
   struct Changes;
   HeldSystem() = default;
-  /// held_values: nullptr for 0.
-  Points solve(const Points& rhs, const Points* held_values, Precision precision) const;
+  /// n x c. held_values: c columns, nullptr for 0.
+  RowMatrix<double> solve(RowMatrix<double> rhs, const RowMatrix<double>* held_values,
+                          Precision precision) const;
 
   std::shared_ptr<const Factored> factored_;
   std::shared_ptr<const Changes> changes_;  // nullptr: none

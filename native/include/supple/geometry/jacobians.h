@@ -40,10 +40,6 @@ Matrix3 closest_rotation(const Matrix3& j);
 
 /// m x 9: `closest_rotation` of each row.
 MatrixField closest_rotations(const MatrixField& jacobians);
-/// The same of `count` matrices of 9 numbers each, by the calling thread alone; in single precision
-/// to some 1e-6.
-void closest_rotations(const double* jacobians, double* rotations, Eigen::Index count,
-                       Precision precision);
 
 /// Polar decomposition J = W Q: Q the closest rotation, W = J Q^T symmetric.
 struct PolarDecomposition {

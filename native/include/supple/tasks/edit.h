@@ -83,6 +83,7 @@ struct EditResult {
 
 class EditSession;
 class EnclosedVolume;
+struct FaceBlocks;
 struct SoftHandles;
 
 /// Handles bound to a prepared mesh, for any targets. Immutable.
@@ -127,6 +128,7 @@ class Editor {
   std::shared_ptr<const HeldSystem> poisson_;
   std::shared_ptr<const BiharmonicInterpolation> interpolation_;
   std::shared_ptr<const EnclosedVolume> volume_;
+  std::shared_ptr<const FaceBlocks> faces_;
 };
 
 /// An edit that goes on while its targets change: a drag. Not safe to share between threads.

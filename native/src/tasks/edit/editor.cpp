@@ -3,6 +3,7 @@
 #include <limits>
 #include <utility>
 
+#include "face_blocks.h"
 #include "handle_checks.h"
 #include "soft_handles.h"
 #include "suggestion.h"
@@ -213,6 +214,7 @@ void Editor::bind(const Editor* former, const ProgressRange& progress) {
   }
   progress.report(0.5);
   volume_ = former == nullptr ? std::make_shared<const EnclosedVolume>(operators) : former->volume_;
+  faces_ = former == nullptr ? std::make_shared<const FaceBlocks>(operators) : former->faces_;
   interpolation_ = std::make_shared<const BiharmonicInterpolation>(
       prepared_->pinned(), std::move(points),
       former == nullptr ? nullptr : former->interpolation_.get(),

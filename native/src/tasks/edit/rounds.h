@@ -1,35 +1,27 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One round of an edit, local part: what a Poisson solve is to add to the moved vertices. Each
-// returns grad^T A (T - J), n x 3, with J the Jacobians of `moved` and T the target of each face.
+// One round of an edit, local part: what a Poisson solve is to add to the moved vertices. Those
+// that return n x 3 return grad^T A (T - J), with J the Jacobians of `moved` and T the target of
+// each face. start: S, the Jacobians of another pose than rest that the edit starts from, or
+// nullptr; Q: the rotation with the least |J - S Q|, to single precision.
 #pragma once
 
-#include "supple/geometry/surface_operators.h"
+#include "face_blocks.h"
 
 namespace supple {
 
-/// T the given rotations or Jacobians, m x 9.
-Points towards(const SurfaceOperators& operators, const Points& moved, const MatrixField& targets);
+/// T = S X. targets: m x 9, X, rotations or Jacobians from the start.
+Points towards(const FaceBlocks& faces, const Points& moved, const MatrixField& targets,
+               const BlockField* start);
 
-/// T = Q, the closest rotation of J.
-Points towards_rotations(const SurfaceOperators& operators, const Points& moved);
+/// T = S Q.
+Points towards_rotations(const FaceBlocks& faces, const Points& moved, const BlockField* start);
 
-/// m x 9: Q, the closest rotations of the Jacobians of `moved`.
-MatrixField rotations_of(const SurfaceOperators& operators, const Points& moved);
+/// m x 9: Q.
+MatrixField rotations_of(const FaceBlocks& faces, const Points& moved, const BlockField* start);
 
-/// m x 9: the rotations Q that have the least |J - S Q|, from another pose than rest. start: m x 9,
-/// S, the Jacobians of that pose.
-MatrixField rotations_from(const SurfaceOperators& operators, const Points& moved,
-                           const MatrixField& start);
-
-/// Sets each matrix X of `field` to S X. start: m x 9, S.
-void follow(const MatrixField& start, MatrixField& field);
-
-/// T = S Q, with the rotation Q that has the least |J - S Q|. stretch: m x 9, S.
-Points towards_stretched(const SurfaceOperators& operators, const Points& moved,
-                         const MatrixField& stretch);
-
-/// predicted: m x 9 Jacobians P Q; returned with P brought nearer to the identity: of P - I,
-/// `share` is kept and no more than `most` in norm. stretch: m x 9, set to what is left of P.
-void bound_stretch(double share, double most, MatrixField& predicted, MatrixField& stretch);
+/// T = S P Q, of predicted Jacobians P Q (m x 9) from the start with P brought nearer to the
+/// identity: of P - I, `share` is kept and no more than `most` in norm. stretch: set to S P.
+Points towards_bounded(const FaceBlocks& faces, const Points& moved, const MatrixField& predicted,
+                       double share, double most, const BlockField* start, BlockField& stretch);
 
 }  // namespace supple

@@ -112,11 +112,15 @@ struct EditSession::State {
   void suggest();
   /// Adds what the residual of the Poisson equation and the soft handles' pulls leave to be done.
   void correct(Points residual);
+  const BlockField* from_start() const { return start == nullptr ? nullptr : &start_stretch; }
   /// m x 9: what `points` make of the faces since the start: closest rotations.
-  MatrixField rotations_since_start(const Points& points) const;
-  Points towards_own_rotations() const;
+  MatrixField rotations_since_start(const Points& points) const {
+    return rotations_of(*editor->faces_, points, from_start());
+  }
+  bool restores_next() const { return report.volume_kept && next + 2 == usable(); }
   void round(bool use_network);
   void polish_pass();
+  void restore_volume();
   void pass();
   void find_kept_volumes(const std::vector<HandleTarget>& targets);
 
@@ -135,7 +139,9 @@ struct EditSession::State {
   RigidMotion whole;
   std::vector<Matrix3> guide_rotations;
   Points moved;
-  MatrixField stretch;           // of the last round with the network, times the start's Jacobians
+  BlockField start_stretch;      // the start's Jacobians; empty at rest
+  BlockField stretch;            // of the last round with the network, times the start's Jacobians
+  Points way;                    // along which lost volume is restored; empty before it is known
   Eigen::VectorXd kept_volumes;  // a component: its volume before the edit, 0 where it is not kept
   std::unique_ptr<DeformationEnergy> energy;
   std::unique_ptr<PulledEnergy> pulled;  // with the soft handles
@@ -179,6 +185,7 @@ void EditSession::State::aim(const std::vector<HandleTarget>& targets,
   if (start != nullptr && with_network) {
     look = e.context_->look(start->vertices, start->face_normals, start->vertex_normals);
   }
+  start_stretch = start == nullptr ? BlockField() : in_blocks(start->jacobians);
   of_start.reset();
   const Points& before = from();
   positions = target_positions(targets);
@@ -215,7 +222,8 @@ void EditSession::State::aim(const std::vector<HandleTarget>& targets,
   descent.reset();
   pulled.reset();
   energy.reset();
-  stretch.resize(0, 9);
+  stretch.clear();
+  way.resize(0, 3);
   stiffenings = 0;
   next = 0;
   report = EditReport{};
@@ -290,11 +298,8 @@ Points EditSession::State::smooth_displacement() const {
 // From the rigid motion, which needs no correction where the handles ask for nothing else.
 void EditSession::State::suggest() {
   const Points& before = from();
-  MatrixField rotations =
+  const MatrixField rotations =
       interpolated_rotations(operators(), *editor->interpolation_, guide_rotations, whole.rotation);
-  if (start != nullptr) {
-    follow(start->jacobians, rotations);
-  }
   moved.resize(before.rows(), 3);
 #pragma omp parallel for schedule(static)
   for (Eigen::Index v = 0; v < moved.rows(); ++v) {
@@ -303,45 +308,45 @@ void EditSession::State::suggest() {
   for (const int place : editor->firm_) {
     moved.row(editor->held_[place]) = held.row(place);
   }
-  correct(towards(operators(), moved, rotations));
+  correct(towards(*editor->faces_, moved, rotations, from_start()));
 }
 
 void EditSession::State::correct(Points residual) {
   editor->soft_->add_residual(moved, soft_targets, residual);
-  moved += editor->poisson_->correction(residual);
-}
-
-MatrixField EditSession::State::rotations_since_start(const Points& points) const {
-  return start == nullptr ? rotations_of(operators(), points)
-                          : rotations_from(operators(), points, start->jacobians);
-}
-
-Points EditSession::State::towards_own_rotations() const {
-  return start == nullptr ? towards_rotations(operators(), moved)
-                          : towards_stretched(operators(), moved, start->jacobians);
+  if (next == 0 || !restores_next()) {
+    moved += editor->poisson_->correction(residual);
+    return;
+  }
+  // What remains to be done changes the shape so little that its volume's gradient stays the same.
+  auto [change, along] = editor->poisson_->corrections(residual, editor->volume_->gradient(moved));
+  moved += change;
+  way = std::move(along);
 }
 
 void EditSession::State::round(bool use_network) {
+  const FaceBlocks& faces = *editor->faces_;
   if (!use_network) {
-    correct(towards_own_rotations());
+    correct(towards_rotations(faces, moved, from_start()));
     return;
   }
   Signal signal;
   signal.fields.push_back(rotations_since_start(moved));
-  MatrixField jacobians = editor->network_->forward(*editor->context_, signal, nullptr,
-                                                    start == nullptr ? nullptr : &look);
+  const MatrixField jacobians = editor->network_->forward(*editor->context_, signal, nullptr,
+                                                          start == nullptr ? nullptr : &look);
   // Towards the stiff end less of the network's stretch is kept.
-  bound_stretch(1.0 - options.stiffness, kMostStretch, jacobians, stretch);
-  if (start != nullptr) {
-    follow(start->jacobians, jacobians);
-    follow(start->jacobians, stretch);
-  }
-  correct(towards(operators(), moved, jacobians));
+  correct(towards_bounded(faces, moved, jacobians, 1.0 - options.stiffness, kMostStretch,
+                          from_start(), stretch));
 }
 
 void EditSession::State::polish_pass() {
-  correct(stretch.rows() == 0 ? towards_own_rotations()
-                              : towards_stretched(operators(), moved, stretch));
+  correct(towards_rotations(*editor->faces_, moved, stretch.empty() ? from_start() : &stretch));
+}
+
+void EditSession::State::restore_volume() {
+  if (way.rows() == 0) {  // there was no round
+    way = editor->poisson_->correction(editor->volume_->gradient(moved));
+  }
+  editor->volume_->restore(kept_volumes, way, moved);
 }
 
 void EditSession::State::pass() {
@@ -389,7 +394,7 @@ void EditSession::State::step() {
     ++report.polish;
     report.rounds_milliseconds += watch.milliseconds();
   } else if (next < usable()) {
-    editor->volume_->restore(*editor->poisson_, kept_volumes, moved);
+    restore_volume();
     report.rounds_milliseconds += watch.milliseconds();
   } else {
     pass();

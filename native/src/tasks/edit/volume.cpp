@@ -98,26 +98,59 @@ Eigen::VectorXd EnclosedVolume::in(const Points& pose) const {
   return result;
 }
 
-void EnclosedVolume::restore(const HeldSystem& poisson, const Eigen::VectorXd& kept,
-                             Points& moved) const {
-  const Points slope = gradient(moved);
-  const Points way = poisson.correction(slope);
-  const Points bend = gradient(way);
+std::vector<EnclosedVolume::Cubic> EnclosedVolume::along(const Points& moved,
+                                                         const Points& way) const {
+  // Always as many parts, so that no sum depends on the number of threads.
+  constexpr Eigen::Index kParts = 16;
+  const Faces& faces = operators_.faces;
+  const auto pieces = static_cast<size_t>(operators_.component_count);
+  // A closed surface's volume is the same from any point; from one far away little is left of it.
+  const Eigen::RowVector3d centre = moved.colwise().mean();
+  std::vector<std::vector<Cubic>> parts(kParts, std::vector<Cubic>(pieces));
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index part = 0; part < kParts; ++part) {
+    std::vector<Cubic>& sums = parts[static_cast<size_t>(part)];
+    for (Eigen::Index f = faces.rows() * part / kParts; f < faces.rows() * (part + 1) / kParts;
+         ++f) {
+      const Eigen::RowVector3d a = moved.row(faces(f, 0)) - centre,
+                               b = moved.row(faces(f, 1)) - centre,
+                               c = moved.row(faces(f, 2)) - centre, u = way.row(faces(f, 0)),
+                               v = way.row(faces(f, 1)), w = way.row(faces(f, 2));
+      // (a + t u) . (b + t v) x (c + t w)
+      const Eigen::RowVector3d still = b.cross(c), mixed = b.cross(w) + v.cross(c),
+                               bent = v.cross(w);
+      Cubic& sum = sums[static_cast<size_t>(operators_.component[faces(f, 0)])];
+      sum.c[0] += a.dot(still);
+      sum.c[1] += u.dot(still) + a.dot(mixed);
+      sum.c[2] += u.dot(mixed) + a.dot(bent);
+      sum.c[3] += u.dot(bent);
+    }
+  }
+  std::vector<Cubic> result(pieces);
+  for (const std::vector<Cubic>& sums : parts) {
+    for (size_t piece = 0; piece < pieces; ++piece) {
+      for (int i = 0; i < 4; ++i) {
+        result[piece].c[i] += sums[piece].c[i] / 6.0;
+      }
+    }
+  }
+  return result;
+}
+
+void EnclosedVolume::restore(const Eigen::VectorXd& kept, const Points& way, Points& moved) const {
+  const std::vector<Cubic> volume = along(moved, way);
   const Eigen::Index pieces = at_rest_.size();
-  // V(moved + t way) = now + first t + second t^2 + third t^3.
-  const Eigen::VectorXd now = of(moved, slope), third = of(way, bend);
-  Eigen::VectorXd first = Eigen::VectorXd::Zero(pieces), second = first, farthest = first;
+  Eigen::VectorXd farthest = Eigen::VectorXd::Zero(pieces);
   for (Eigen::Index v = 0; v < moved.rows(); ++v) {
-    const int piece = operators_.component[v];
-    first[piece] += slope.row(v).dot(way.row(v));
-    second[piece] += moved.row(v).dot(bend.row(v));
-    farthest[piece] = std::max(farthest[piece], way.row(v).squaredNorm());
+    double& here = farthest[operators_.component[v]];
+    here = std::max(here, way.row(v).squaredNorm());
   }
   Eigen::VectorXd length = Eigen::VectorXd::Zero(pieces);
-  for (Eigen::Index c = 0; c < pieces; ++c) {
-    if (kept[c] > 0.0 && first[c] > 0.0) {
-      length[c] = root(first[c], second[c], third[c], kShare * (kept[c] - now[c]),
-                       kFarthest / std::sqrt(farthest[c]));
+  for (Eigen::Index piece = 0; piece < pieces; ++piece) {
+    const double* const c = volume[static_cast<size_t>(piece)].c;
+    if (kept[piece] > 0.0 && c[1] > 0.0) {
+      length[piece] = root(c[1], c[2], c[3], kShare * (kept[piece] - c[0]),
+                           kFarthest / std::sqrt(farthest[piece]));
     }
   }
 #pragma omp parallel for schedule(static)

@@ -2,7 +2,8 @@
 // The volume that an edit encloses. n vertices, surface units.
 #pragma once
 
-#include "supple/geometry/held_system.h"
+#include <vector>
+
 #include "supple/geometry/surface_operators.h"
 
 namespace supple {
@@ -26,12 +27,19 @@ class EnclosedVolume {
   /// encloses next to nothing.
   Eigen::VectorXd in(const Points& pose) const;
 
-  /// Moves the vertices that are not held, as smoothly as the Poisson equation allows, until each
-  /// component has got back most of the volume it has lost.
+  /// Moves the vertices along `way` (n x 3) until each component has got back most of the volume it
+  /// has lost. way: as smooth as the Poisson equation allows, a solution of it with the gradient of
+  /// about this shape; 0 at held vertices.
   /// kept: a component, its volume before the edit; those with 0 stay as they are.
-  void restore(const HeldSystem& poisson, const Eigen::VectorXd& kept, Points& moved) const;
+  void restore(const Eigen::VectorXd& kept, const Points& way, Points& moved) const;
 
  private:
+  /// What a component encloses at moved + t way: c[0] + c[1] t + c[2] t^2 + c[3] t^3.
+  struct Cubic {
+    double c[4] = {};
+  };
+  std::vector<Cubic> along(const Points& moved, const Points& way) const;
+
   const SurfaceOperators& operators_;
   Eigen::VectorXd at_rest_;
 };

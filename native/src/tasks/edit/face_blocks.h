@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Faces eight by eight, number e of all eight matrices side by side: what rounds of an edit compute
+// with, whole vectors at a time.
+#pragma once
+
+#include <vector>
+
+#include "supple/geometry/surface_operators.h"
+
+namespace supple {
+
+constexpr Eigen::Index kBlock = 8;
+
+/// 3x3 matrices of eight faces; number 3 i + j of face f is e[3 i + j][f].
+struct alignas(64) MatrixBlock {
+  double e[9][kBlock];
+};
+
+inline Eigen::Index block_count(Eigen::Index faces) { return (faces + kBlock - 1) / kBlock; }
+
+/// A field of m matrices. Those beyond the last face are the identity.
+using BlockField = std::vector<MatrixBlock>;
+/// field: m x 9.
+BlockField in_blocks(const MatrixField& field);
+
+/// What rounds need of a rest surface. Immutable.
+struct FaceBlocks {
+  /// operators: kept, not owned.
+  explicit FaceBlocks(const SurfaceOperators& operators);
+
+  const SurfaceOperators& operators;
+  BlockField inverse_frames;  ///< E1^-1
+  std::vector<double> areas;  ///< a face; 0 beyond the last
+};
+
+}  // namespace supple
