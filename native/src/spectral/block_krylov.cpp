@@ -17,6 +17,9 @@ namespace {
 // Columns of a new block shorter than this, relative to before they were made orthogonal, are
 // rounding: the space has ended in that direction.
 constexpr double kLost = 1e-12;
+// Parts of a block along those long before it that are still as good as none. Where more is found,
+// nothing is skipped any more.
+constexpr double kMostRounding = 1e-11;
 
 class BlockKrylov {
  public:
@@ -67,22 +70,54 @@ class BlockKrylov {
     }
   }
 
-  // Takes the parts along the kernel, `locked` and the basis's columns from `first` on out of a
-  // block; adds those along the basis to `coefficients`, of the block before it was scaled.
-  void make_orthogonal(RowMatrix<double>& block, Eigen::Index first, const RowMatrix<double>& scale,
-                       RowMatrix<double>* coefficients) {
+  struct Columns {
+    Eigen::Index first, count;
+  };
+  // What the rounding of a block that is about to be appended is taken out along. All of the basis
+  // has to be read for that, which on a large mesh takes as long as the solves. But what is left
+  // grows along functions that have converged, some hundred times a block, and those lie in the
+  // first columns; so all are looked at for two blocks in every four (Simon 1984: partial
+  // reorthogonalisation, of two neighbours each time), and for others those and the last two.
+  std::vector<Columns> rounding() const {
+    constexpr Eigen::Index kPeriod = 4;
+    const Eigen::Index head = std::max(round_up(options_.count / 2), kept_);
+    if (!skips_ || head + 2 * width_ >= filled_ || filled_ / width_ % kPeriod < 2) {
+      return {{0, filled_}};
+    }
+    return {{0, head}, last_two()};
+  }
+  Columns last_two() const { return {filled_ - 2 * width_, 2 * width_}; }
+
+  // Takes the parts along the kernel, `locked` and some of the basis's columns out of a block; adds
+  // those along the basis to `coefficients`, of the block before it was scaled. Returns the largest
+  // of them but for the last two blocks'.
+  double make_orthogonal(RowMatrix<double>& block, const std::vector<Columns>& against,
+                         const RowMatrix<double>& scale, RowMatrix<double>* coefficients) {
     problem_.leave_kernel(block);
     if (locked_.cols() > 0) {
       add_tall_product<double>(-1.0, {locked_}, tall_product<double>({locked_}, block), block);
     }
-    const Eigen::Index count = filled_ - first;
-    if (count > 0) {
-      const RowMatrix<double> part = tall_product<double>(columns(first, count), block);
-      add_tall_product<double>(-1.0, columns(first, count), part, block);
-      if (coefficients != nullptr) {
-        coefficients->bottomRows(count) += part * scale;
+    TallPieces<double> pieces;
+    for (const Columns& range : against) {
+      for (const auto& piece : columns(range.first, range.count)) {
+        pieces.push_back(piece);
       }
     }
+    if (pieces.empty()) {
+      return 0.0;
+    }
+    const RowMatrix<double> part = tall_product<double>(pieces, block);
+    add_tall_product<double>(-1.0, pieces, part, block);
+    if (coefficients != nullptr) {
+      const RowMatrix<double> scaled = part * scale;
+      Eigen::Index done = 0;
+      for (const Columns& range : against) {
+        coefficients->middleRows(range.first, range.count) += scaled.middleRows(done, range.count);
+        done += range.count;
+      }
+    }
+    const Eigen::Index before = part.rows() - 2 * width_;
+    return before > 0 ? part.topRows(before).cwiseAbs().maxCoeff() : 0.0;
   }
 
   // Makes a block orthonormal to all before and appends it. For a block A V_last, records its
@@ -92,9 +127,15 @@ class BlockKrylov {
     const double before = block.norm();
     for (int pass = 0; pass < 4; ++pass) {
       // A V_last has parts along its own block and the one before, or what a restart kept. Along
-      // the others it has only rounding, which one look at all of them takes out.
-      const bool all = pass > 0 || filled_ <= kept_ + 2 * width_;
-      make_orthogonal(block, all ? 0 : filled_ - 2 * width_, below, coefficients);
+      // the others it has only rounding, which the next pass takes out.
+      if (pass == 0 && filled_ > kept_ + 2 * width_) {
+        make_orthogonal(block, {last_two()}, below, coefficients);
+      } else if (filled_ > 0) {
+        const double found = make_orthogonal(block, rounding(), below, coefficients);
+        skips_ = skips_ && (pass == 0 || found < kMostRounding);
+      } else {
+        make_orthogonal(block, {}, below, coefficients);
+      }
       // block = Q T by the eigenvectors of its Gram matrix (SVQB, Stathopoulos and Wu 2002).
       Eigen::MatrixXd gram = tall_product<double>({block}, block);
       const Eigen::VectorXd size = symmetric_eigen(gram);
@@ -223,6 +264,7 @@ class BlockKrylov {
   Eigen::Index size_ = 0;    // of them, those that A was applied to
   Eigen::Index kept_ = 0;    // by the last restart
   Eigen::Index applied_ = 0;
+  bool skips_ = true;  // whether all of the basis is looked at for some blocks only
   Eigen::VectorXd ritz_values_, estimate_;
   Eigen::MatrixXd ritz_vectors_;
   Eigen::Index converged_count_ = 0;

@@ -15,7 +15,7 @@ namespace {
 // Part of every key. Raise it when what is computed below changes, be it in the last bit, or the
 // arrays that are kept do: files of before are then not met again, and go as the least recently
 // used.
-constexpr int kPreparedVersion = 3;
+constexpr int kPreparedVersion = 4;
 
 // Meshes of fewer vertices are not cached: they are prepared in less time than a file takes to be
 // written to a disk.

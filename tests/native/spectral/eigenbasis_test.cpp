@@ -142,6 +142,14 @@ TEST(Eigenbasis, AsManyFunctionsAsVertices) {
   EXPECT_LT((basis.project(field, 8) - field).norm(), 1e-12);
 }
 
+// A space of some 900 dimensions, most of whose blocks are not compared with all before them.
+TEST(Eigenbasis, SlowManyFunctionsStayOrthonormal) {
+  const SurfaceOperators operators = operators_of(zoo::perturbed_sphere(4, 3));
+  const Eigenbasis basis = basis_of(operators, 256);
+  EXPECT_LT(orthonormality_error(basis), 1e-11);
+  EXPECT_LT(recomputed_residual(operators.laplacian, basis), 1e-8);
+}
+
 TEST(Eigenbasis, SameBytesEveryTime) {
   const SurfaceOperators operators = operators_of(zoo::perturbed_sphere(3, 1));
   const Eigenbasis a = basis_of(operators, 30), b = basis_of(operators, 30);
