@@ -7,6 +7,7 @@
 
 #include "native/support.h"
 #include "supple/geometry/jacobians.h"
+#include "supple/geometry/rotations.h"
 
 namespace supple {
 namespace {
@@ -71,11 +72,20 @@ class Rounds : public ::testing::Test {
   BlockField pose_blocks;
 };
 
-TEST_F(Rounds, TowardsGivenMatrices) {
-  const MatrixField targets = stretches(jacobians.rows());
+// By angles from nearly none to a whole turn.
+TEST_F(Rounds, TowardsTurns) {
+  const Matrix3 whole = test::rotation(4);
+  RowMatrix<double> vectors = test::noise(moved.rows(), 3, 9);
+  vectors.topRows(vectors.rows() / 2) *= 3.0;
+  vectors.topRows(20) *= 1e-7;
+  vectors.bottomRows(20).rowwise() = Eigen::RowVector3d(0.0, 6.0, 1.0);
   from_both([&](const MatrixField* start, const BlockField* blocks) {
-    expect_near(towards(faces, moved, targets, blocks), expected([&](Eigen::Index f) -> Matrix3 {
-                  return start_at(start, f) * matrix_at(targets, f);
+    expect_near(towards_turned(faces, moved, vectors, whole, blocks),
+                expected([&](Eigen::Index f) -> Matrix3 {
+                  const auto face = operators.faces.row(f);
+                  const Eigen::RowVector3d mean =
+                      (vectors.row(face[0]) + vectors.row(face[1]) + vectors.row(face[2])) / 3.0;
+                  return start_at(start, f) * whole * rotation_matrix(mean);
                 }));
   });
 }

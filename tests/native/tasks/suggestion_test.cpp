@@ -7,6 +7,7 @@
 
 #include "native/tasks/editing.h"
 #include "supple/geometry/jacobians.h"
+#include "supple/geometry/rotations.h"
 
 namespace supple {
 namespace {
@@ -110,7 +111,7 @@ TEST(FarApart, PointsOnOneAnotherAreChosenOnceEach) {
   EXPECT_EQ(std::set<int>(chosen.begin(), chosen.end()).size(), 4u);
 }
 
-TEST(InterpolatedRotations, AreRotationsAndMeetThoseGiven) {
+TEST(InterpolatedTurns, MeetThoseGiven) {
   const SurfaceOperators operators{
       TriangleMesh(zoo::icosphere(3).vertices, zoo::icosphere(3).faces)};
   const auto base = std::make_shared<const PinnedLaplacian>(
@@ -118,22 +119,20 @@ TEST(InterpolatedRotations, AreRotationsAndMeetThoseGiven) {
   const BiharmonicInterpolation interpolation(base, Eigen::Vector3i(0, 200, 600));
   const std::vector<Matrix3> given = {test::rotation(0), about({0, 0, 1}, 0.4), test::rotation(2)};
   for (const Matrix3& whole : {Matrix3(Matrix3::Identity()), test::rotation(5)}) {
-    const MatrixField field = interpolated_rotations(operators, interpolation, given, whole);
-    for (Eigen::Index f = 0; f < field.rows(); ++f) {
-      const Matrix3 q = matrix_at(field, f);
-      ASSERT_LT((q.transpose() * q - Matrix3::Identity()).norm(), 1e-13);
-      ASSERT_GT(q.determinant(), 0.5);
-      for (int p = 0; p < 3; ++p) {
-        if ((operators.faces.row(f).array() == interpolation.points()[p]).any()) {
-          // A face's is that of its middle, a third of an edge away.
-          EXPECT_LT((q - given[static_cast<size_t>(p)]).norm(), 0.3);
-        }
-      }
+    const auto rotation_at = [&](const RowMatrix<double>& turns, Eigen::Index v) -> Matrix3 {
+      return whole * rotation_matrix(Eigen::RowVector3d(turns.row(v)));
+    };
+    const RowMatrix<double> turns = interpolated_turns(interpolation, given, whole);
+    ASSERT_EQ(turns.rows(), operators.vertices.rows());
+    for (int p = 0; p < 3; ++p) {
+      EXPECT_LT(
+          (rotation_at(turns, interpolation.points()[p]) - given[static_cast<size_t>(p)]).norm(),
+          1e-6);
     }
     const std::vector<Matrix3> same(3, given[0]);
-    const MatrixField all = interpolated_rotations(operators, interpolation, same, whole);
-    for (Eigen::Index f = 0; f < all.rows(); ++f) {
-      ASSERT_LT((matrix_at(all, f) - given[0]).norm(), 1e-12);
+    const RowMatrix<double> all = interpolated_turns(interpolation, same, whole);
+    for (Eigen::Index v = 0; v < all.rows(); ++v) {
+      ASSERT_LT((rotation_at(all, v) - given[0]).norm(), 1e-12);
     }
   }
 }

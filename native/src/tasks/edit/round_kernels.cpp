@@ -98,6 +98,52 @@ SUPPLE_INLINE void moved_jacobians(const RoundTask& task, Eigen::Index block, Ma
   multiply<Bytes, false>(task.faces->inverse_frames[static_cast<size_t>(block)], frame, out);
 }
 
+// W R. R = (R_q^2)^2, where R_q turns by a quarter of the angle: for as little as that, the series
+// of sin(x)/x and (1 - cos x)/x^2 need few terms.
+template <int Bytes>
+SUPPLE_INLINE void turn(const RoundTask& task, Eigen::Index block, MatrixBlock& out) {
+  using D = Doubles<Bytes>;
+  const Faces& faces = task.faces->operators.faces;
+  alignas(64) double vector[3][kBlock];
+  for (Eigen::Index i = 0; i < kBlock; ++i) {
+    const Eigen::Index f = std::min(kBlock * block + i, faces.rows() - 1);
+    for (int j = 0; j < 3; ++j) {
+      vector[j][i] = (task.vectors[3 * faces(f, 0) + j] + task.vectors[3 * faces(f, 1) + j] +
+                      task.vectors[3 * faces(f, 2) + j]) *
+                     (0.25 / 3.0);
+    }
+  }
+  MatrixBlock quarter, half;
+  for (int l = 0; l < kBlock; l += D::kCount) {
+    const typename D::V &x = D::at(vector[0], l), &y = D::at(vector[1], l),
+                        &z = D::at(vector[2], l);
+    const typename D::V square = x * x + y * y + z * z;
+    constexpr int kTerms = 12;  // of double precision up to a whole turn, four times this angle
+    typename D::V s{}, c{};
+    for (int k = kTerms - 1; k >= 0; --k) {
+      s = 1.0 - s * square * (1.0 / ((2 * k + 2) * (2 * k + 3)));
+      c = 1.0 - c * square * (1.0 / ((2 * k + 3) * (2 * k + 4)));
+    }
+    c *= 0.5;
+    D::at(quarter.e[0], l) = 1.0 - c * (y * y + z * z);
+    D::at(quarter.e[1], l) = c * x * y - s * z;
+    D::at(quarter.e[2], l) = c * x * z + s * y;
+    D::at(quarter.e[3], l) = c * x * y + s * z;
+    D::at(quarter.e[4], l) = 1.0 - c * (x * x + z * z);
+    D::at(quarter.e[5], l) = c * y * z - s * x;
+    D::at(quarter.e[6], l) = c * x * z - s * y;
+    D::at(quarter.e[7], l) = c * y * z + s * x;
+    D::at(quarter.e[8], l) = 1.0 - c * (x * x + y * y);
+  }
+  multiply<Bytes, false>(quarter, quarter, half);
+  multiply<Bytes, false>(half, half, quarter);
+  MatrixBlock whole;
+  for (int e = 0; e < 9; ++e) {
+    std::fill_n(whole.e[e], kBlock, task.whole[e]);
+  }
+  multiply<Bytes, false>(whole, quarter, out);
+}
+
 void repair(const MatrixBlock& from, int lane, MatrixBlock& to) {
   Matrix3 matrix;
   for (int e = 0; e < 9; ++e) {
@@ -213,14 +259,14 @@ SUPPLE_INLINE void run(const RoundTask& task, Eigen::Index first, Eigen::Index l
     const MatrixBlock* const stretch = task.stretch == nullptr ? nullptr : task.stretch + here;
     MatrixBlock jacobians, target, other;
     moved_jacobians<Bytes>(task, block, jacobians);
-    if constexpr (Kind == RoundKind::given || Kind == RoundKind::bounded) {
+    if constexpr (Kind == RoundKind::turned) {
+      turn<Bytes>(task, block, target);
+    } else if constexpr (Kind == RoundKind::bounded) {
       load_rows(task.given + 9 * kBlock * block, count, target);
-      if constexpr (Kind == RoundKind::bounded) {
-        bound_stretch<Bytes>(task.share, task.most, target, task.kept[here]);
-        if (stretch != nullptr) {
-          multiply<Bytes, false>(*stretch, task.kept[here], other);
-          task.kept[here] = other;
-        }
+      bound_stretch<Bytes>(task.share, task.most, target, task.kept[here]);
+      if (stretch != nullptr) {
+        multiply<Bytes, false>(*stretch, task.kept[here], other);
+        task.kept[here] = other;
       }
     } else if (stretch == nullptr) {
       find_rotations<kSingle<Bytes>>(jacobians, target);
@@ -264,8 +310,8 @@ struct Kernels {
 
 RoundKernel round_kernel(RoundKind kind) {
   switch (kind) {
-    case RoundKind::given:
-      return Kernels<RoundKind::given>::best();
+    case RoundKind::turned:
+      return Kernels<RoundKind::turned>::best();
     case RoundKind::rotations:
       return Kernels<RoundKind::rotations>::best();
     case RoundKind::find:

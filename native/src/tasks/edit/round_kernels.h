@@ -10,17 +10,19 @@
 namespace supple {
 
 enum class RoundKind {
-  given,      ///< forces towards S X, X given
+  turned,     ///< forces towards S W R, R the rotation about given vectors' mean
   rotations,  ///< forces towards S Q
   find,       ///< no forces; Q is the result
-  bounded,    ///< forces towards S B with B the given X, brought nearer to a rotation
+  bounded,    ///< forces towards S B with B a given X, brought nearer to a rotation
 };
 
 struct RoundTask {
   const FaceBlocks* faces;
   const double* moved;         ///< n x 3
   const MatrixBlock* stretch;  ///< S, a block; or nullptr
-  const double* given;         ///< X, m x 9
+  const double* vectors;       ///< `turned`: n x 3, rotation vectors at vertices
+  const double* whole;         ///< `turned`: W, 9 numbers
+  const double* given;         ///< `bounded`: X, m x 9
   double share, most;          ///< `bounded`: see `bound_stretch` in round_kernels.cpp
   MatrixBlock* kept;           ///< `bounded`: set to S P, with P what is left of X's stretch
   double* rotations;           ///< `find`: set to Q, m x 9

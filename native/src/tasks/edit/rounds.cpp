@@ -35,11 +35,13 @@ Points forces(RoundKind kind, RoundTask task) {
 
 }  // namespace
 
-Points towards(const FaceBlocks& faces, const Points& moved, const MatrixField& targets,
-               const BlockField* start) {
+Points towards_turned(const FaceBlocks& faces, const Points& moved,
+                      const RowMatrix<double>& vectors, const Matrix3& whole,
+                      const BlockField* start) {
   RoundTask task = task_of(faces, moved, start);
-  task.given = targets.data();
-  return forces(RoundKind::given, task);
+  task.vectors = vectors.data();
+  task.whole = whole.data();
+  return forces(RoundKind::turned, task);
 }
 
 Points towards_rotations(const FaceBlocks& faces, const Points& moved, const BlockField* start) {

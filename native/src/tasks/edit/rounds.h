@@ -9,9 +9,11 @@
 
 namespace supple {
 
-/// T = S X. targets: m x 9, X, rotations or Jacobians from the start.
-Points towards(const FaceBlocks& faces, const Points& moved, const MatrixField& targets,
-               const BlockField* start);
+/// T = S W R, with R the rotation about the mean of `vectors` (n x 3, rotation vectors) at the
+/// face's corners and W `whole`.
+Points towards_turned(const FaceBlocks& faces, const Points& moved,
+                      const RowMatrix<double>& vectors, const Matrix3& whole,
+                      const BlockField* start);
 
 /// T = S Q.
 Points towards_rotations(const FaceBlocks& faces, const Points& moved, const BlockField* start);

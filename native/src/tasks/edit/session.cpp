@@ -298,8 +298,8 @@ Points EditSession::State::smooth_displacement() const {
 // From the rigid motion, which needs no correction where the handles ask for nothing else.
 void EditSession::State::suggest() {
   const Points& before = from();
-  const MatrixField rotations =
-      interpolated_rotations(operators(), *editor->interpolation_, guide_rotations, whole.rotation);
+  const RowMatrix<double> turns =
+      interpolated_turns(*editor->interpolation_, guide_rotations, whole.rotation);
   moved.resize(before.rows(), 3);
 #pragma omp parallel for schedule(static)
   for (Eigen::Index v = 0; v < moved.rows(); ++v) {
@@ -308,7 +308,7 @@ void EditSession::State::suggest() {
   for (const int place : editor->firm_) {
     moved.row(editor->held_[place]) = held.row(place);
   }
-  correct(towards(*editor->faces_, moved, rotations, from_start()));
+  correct(towards_turned(*editor->faces_, moved, turns, whole.rotation, from_start()));
 }
 
 void EditSession::State::correct(Points residual) {

@@ -46,23 +46,13 @@ Matrix3 rotation_around(const Points& rest, const Points& moved, const Eigen::Ro
   return closest_rotation(correlation / size + kOpen * otherwise);
 }
 
-MatrixField interpolated_rotations(const SurfaceOperators& operators,
-                                   const BiharmonicInterpolation& interpolation,
-                                   const std::vector<Matrix3>& rotations, const Matrix3& whole) {
+RowMatrix<double> interpolated_turns(const BiharmonicInterpolation& interpolation,
+                                     const std::vector<Matrix3>& rotations, const Matrix3& whole) {
   RowMatrix<double> vectors(static_cast<Eigen::Index>(rotations.size()), 3);
   for (size_t i = 0; i < rotations.size(); ++i) {
     vectors.row(static_cast<Eigen::Index>(i)) = rotation_vector(whole.transpose() * rotations[i]);
   }
-  const RowMatrix<double> field = interpolation.solve(vectors);
-  MatrixField result(operators.faces.rows(), 9);
-#pragma omp parallel for schedule(static)
-  for (Eigen::Index f = 0; f < result.rows(); ++f) {
-    const auto face = operators.faces.row(f);
-    const Eigen::RowVector3d mean =
-        (field.row(face[0]) + field.row(face[1]) + field.row(face[2])) / 3.0;
-    matrix_at(result, f) = whole * rotation_matrix(mean);
-  }
-  return result;
+  return interpolation.solve(vectors);
 }
 
 std::vector<int> far_apart(const Points& points) {

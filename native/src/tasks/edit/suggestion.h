@@ -31,11 +31,10 @@ RigidMotion nearest_motion(const Points& rest, const Points& moved, const Eigen:
 Matrix3 rotation_around(const Points& rest, const Points& moved, const Eigen::RowVector3d& place,
                         const Matrix3& otherwise);
 
-/// m x 9: rotations on faces that interpolate those at `interpolation.points()`: biharmonic
-/// interpolation of their rotation vectors, taken from `whole`.
-MatrixField interpolated_rotations(const SurfaceOperators& operators,
-                                   const BiharmonicInterpolation& interpolation,
-                                   const std::vector<Matrix3>& rotations, const Matrix3& whole);
+/// n x 3: at each vertex the rotation vector of W^T R, with R between the rotations given at
+/// `interpolation.points()` and W `whole`: biharmonic interpolation.
+RowMatrix<double> interpolated_turns(const BiharmonicInterpolation& interpolation,
+                                     const std::vector<Matrix3>& rotations, const Matrix3& whole);
 
 /// Places among a handle's points (k x 3, surface units) that stand for all: far from each other,
 /// at least 4 and at most 64 where there are so many. They depend on this handle alone.
