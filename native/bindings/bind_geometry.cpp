@@ -63,8 +63,7 @@ void bind_geometry(py::module_& module) {
         return jacobians(inverse_frames(face_frames(rest, faces)), moved, faces);
       },
       py::arg("rest"), py::arg("faces"), py::arg("moved"), NoGil());
-  module.def("closest_rotations", py::overload_cast<const MatrixField&>(&closest_rotations),
-             py::arg("jacobians"), NoGil());
+  module.def("closest_rotations", &closest_rotations, py::arg("jacobians"), NoGil());
 
   py::class_<SparseCholesky>(module, "SparseCholesky")
       .def(py::init(&factored), py::arg("matrix"), py::arg("backend") = py::none(),

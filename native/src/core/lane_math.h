@@ -46,8 +46,15 @@ SUPPLE_INLINE void transpose_lanes(typename Lanes<Scalar, Bytes>::type* rows) {
     for (int i = 0; i < kLanes; ++i) {
       if ((i & step) == 0) {
         const V a = rows[i], b = rows[i + step];
+#ifdef __clang__  // which has no shuffle by a vector
+        for (int l = 0; l < kLanes; ++l) {
+          rows[i][l] = low[l] < kLanes ? a[low[l]] : b[low[l] - kLanes];
+          rows[i + step][l] = high[l] < kLanes ? a[high[l]] : b[high[l] - kLanes];
+        }
+#else
         rows[i] = __builtin_shuffle(a, b, low);
         rows[i + step] = __builtin_shuffle(a, b, high);
+#endif
       }
     }
   }

@@ -28,7 +28,8 @@ Points CornerForces<Scalar>::gathered() const {
       const int f = corners.corner[i] / 3, c = corners.corner[i] - 3 * f;
       const Force& force = forces_[static_cast<size_t>(f)];
       for (int j = 0; j < 3; ++j) {
-        sum[j] += c == 0 ? -force.one[j] - force.two[j] : c == 1 ? force.one[j] : force.two[j];
+        const double one = force.one[j], two = force.two[j];
+        sum[j] += c == 0 ? -one - two : c == 1 ? one : two;
       }
     }
     result.row(v) = Eigen::Map<const Eigen::RowVector3d>(sum);

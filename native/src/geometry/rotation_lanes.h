@@ -31,8 +31,8 @@ SUPPLE_INLINE void cofactors(const V* q, V* out) {
   }
 }
 
-/// Sets q (9 vectors: J, none of them 0) to the closest rotations, and good[l] (one a lane) to
-/// whether lane l is there; where not, J is near a singular or mirrored matrix and needs
+/// Sets q (9 vectors: J) to the closest rotations, and good[l] (one a lane) to
+/// whether lane l is there; where not, J is near a singular or mirrored matrix, or 0, and needs
 /// `closest_rotation`.
 ///
 /// Newton's iteration. With singular values s (the last one negative where J is mirrored),

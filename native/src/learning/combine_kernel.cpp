@@ -19,7 +19,8 @@ constexpr Eigen::Index columns_for(int fields) {
   return (count + kTogether - 1) / kTogether * kTogether;
 }
 constexpr Eigen::Index kMostColumns = columns_for(kMaxFields);
-constexpr Eigen::Index kMostFunctions = scale_limit(kScaleCount - 1);
+// Functions taken together: of most contexts, all.
+constexpr Eigen::Index kTile = scale_limit(kScaleCount - 1);
 
 template <class Scalar>
 struct Task {
@@ -38,37 +39,40 @@ struct Block {
   using V = typename Lanes<Scalar, Bytes>::type;
   static constexpr int kLanes = Lanes<Scalar, Bytes>::count;
 
-  V functions[kMostFunctions];         // of as many vertices as lanes
+  V functions[kTile];                  // of as many vertices as lanes
   V bands[kScaleCount][kMostColumns];  // what each band of functions adds up to
   V along[kPadded], normal[kPadded];
 
-  // Of the vertices from `first` on; the last one again where there are no more.
-  SUPPLE_INLINE void load(const Task<Scalar>& task, Eigen::Index first) {
-    const Eigen::Index k = task.ends[kScaleCount - 1];
+  // Functions `tile` to tile + count - 1 of the vertices from `first` on; the last one again where
+  // there are no more.
+  SUPPLE_INLINE void load(const Task<Scalar>& task, Eigen::Index first, Eigen::Index tile,
+                          Eigen::Index count) {
     Eigen::Index j = 0;
-    for (; j + kLanes <= k; j += kLanes) {
+    for (; j + kLanes <= count; j += kLanes) {
       for (int l = 0; l < kLanes; ++l) {
         const Scalar* const from =
-            task.functions + std::min(first + l, task.n - 1) * task.stride + j;
+            task.functions + std::min(first + l, task.n - 1) * task.stride + tile + j;
         __builtin_memcpy(&functions[j + l], from, sizeof(V));
       }
       transpose_lanes<Scalar, Bytes>(functions + j);
     }
-    for (; j < k; ++j) {
+    for (; j < count; ++j) {
       for (int l = 0; l < kLanes; ++l) {
-        functions[j][l] = task.functions[std::min(first + l, task.n - 1) * task.stride + j];
+        functions[j][l] = task.functions[std::min(first + l, task.n - 1) * task.stride + tile + j];
       }
     }
   }
 
-  SUPPLE_INLINE void expand(const Task<Scalar>& task) {
+  // Adds what those functions add up to; the first ones set it.
+  SUPPLE_INLINE void add(const Task<Scalar>& task, Eigen::Index tile, Eigen::Index count) {
     for (Eigen::Index column = 0; column < task.columns; column += kSums<Bytes>) {
       Eigen::Index j = 0;
       for (int s = 0; s < kScaleCount; ++s) {
         V sums[kSums<Bytes>] = {};
-        for (; j < task.ends[s]; ++j) {
+        const Eigen::Index end = std::min(task.ends[s] - tile, count);
+        for (; j < end; ++j) {
           const V& value = functions[j];
-          const Scalar* const c = task.coefficients + j * task.columns + column;
+          const Scalar* const c = task.coefficients + (tile + j) * task.columns + column;
 #pragma GCC unroll 24
           for (int i = 0; i < kSums<Bytes>; ++i) {
             sums[i] += value * c[i];
@@ -76,10 +80,21 @@ struct Block {
         }
 #pragma GCC unroll 24
         for (int i = 0; i < kSums<Bytes>; ++i) {
-          bands[s][column + i] = sums[i];
+          bands[s][column + i] = tile == 0 ? sums[i] : bands[s][column + i] + sums[i];
         }
       }
     }
+  }
+
+  SUPPLE_INLINE void expand(const Task<Scalar>& task, Eigen::Index first) {
+    const Eigen::Index k = task.ends[kScaleCount - 1];
+    Eigen::Index tile = 0;
+    do {
+      const Eigen::Index count = std::min(kTile, k - tile);
+      load(task, first, tile, count);
+      add(task, tile, count);
+      tile += kTile;
+    } while (tile < k);
   }
 
   SUPPLE_INLINE void combine(const Task<Scalar>& task) {
@@ -165,8 +180,7 @@ SUPPLE_INLINE void run(const Task<Scalar>& task, Eigen::Index first, Eigen::Inde
   using B = Block<Scalar, Bytes>;
   B block;
   for (; first < last; first += B::kLanes) {
-    block.load(task, first);
-    block.expand(task);
+    block.expand(task, first);
     block.combine(task);
     block.store(task, first, std::min<Eigen::Index>(B::kLanes, last - first));
   }

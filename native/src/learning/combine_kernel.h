@@ -10,7 +10,7 @@ namespace supple::equivariant {
 template <class Scalar>
 class CombineKernel {
  public:
-  /// outputs: k x output_count coefficients. context and fields: must outlive this.
+  /// outputs: k x output_count coefficients. context: must outlive this.
   CombineKernel(const NetworkContext<Scalar>& context, const Fields<Scalar>& fields,
                 const RowMatrix<Scalar>& outputs);
 

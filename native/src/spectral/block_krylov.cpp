@@ -75,17 +75,18 @@ class BlockKrylov {
   };
   // What the rounding of a block that is about to be appended is taken out along. All of the basis
   // has to be read for that, which on a large mesh takes as long as the solves. But what is left
-  // grows along functions that have converged, some hundred times a block, and those lie in the
+  // grows along functions that have converged, some 500 times a block, and those lie in the
   // first columns; so all are looked at for two blocks in every four (Simon 1984: partial
   // reorthogonalisation, of two neighbours each time), and for others those and the last two.
   std::vector<Columns> rounding() const {
     constexpr Eigen::Index kPeriod = 4;
     const Eigen::Index head = std::max(round_up(options_.count / 2), kept_);
     if (!skips_ || head + 2 * width_ >= filled_ || filled_ / width_ % kPeriod < 2) {
-      return {{0, filled_}};
+      return whole();
     }
     return {{0, head}, last_two()};
   }
+  std::vector<Columns> whole() const { return {{0, filled_}}; }
   Columns last_two() const { return {filled_ - 2 * width_, 2 * width_}; }
 
   // Takes the parts along the kernel, `locked` and some of the basis's columns out of a block; adds
@@ -125,16 +126,23 @@ class BlockKrylov {
   void append(RowMatrix<double> block, RowMatrix<double>* coefficients) {
     RowMatrix<double> below = RowMatrix<double>::Identity(width_, width_);
     const double before = block.norm();
+    bool all = false;       // whether the next pass looks at all of the basis, whatever is due
+    bool complete = false;  // whether a look at all of the basis is known to find nothing
     for (int pass = 0; pass < 4; ++pass) {
       // A V_last has parts along its own block and the one before, or what a restart kept. Along
       // the others it has only rounding, which the next pass takes out.
       if (pass == 0 && filled_ > kept_ + 2 * width_) {
         make_orthogonal(block, {last_two()}, below, coefficients);
       } else if (filled_ > 0) {
-        const double found = make_orthogonal(block, rounding(), below, coefficients);
+        const std::vector<Columns> against = all ? whole() : rounding();
+        const double found = make_orthogonal(block, against, below, coefficients);
+        // Where there is too much, no later block is spared either.
         skips_ = skips_ && (pass == 0 || found < kMostRounding);
+        complete = against.size() == 1 || found < kMostRounding;
+        all = !complete;
       } else {
         make_orthogonal(block, {}, below, coefficients);
+        complete = true;
       }
       // block = Q T by the eigenvectors of its Gram matrix (SVQB, Stathopoulos and Wu 2002).
       Eigen::MatrixXd gram = tall_product<double>({block}, block);
@@ -163,7 +171,8 @@ class BlockKrylov {
         below.topRows(lost).setZero();  // they come from nowhere
       }
       block = std::move(next);
-      if (pass > 0 && lost == 0 && size[0] > 0.9 && size[width_ - 1] < 1.1) {
+      all = all || lost > 0;  // what replaces a lost column has parts along everything
+      if (pass > 0 && complete && lost == 0 && size[0] > 0.9 && size[width_ - 1] < 1.1) {
         break;
       }
     }

@@ -2,7 +2,6 @@
 #include "core/lane_math.h"
 
 #include <cmath>
-#include <limits>
 
 #include "native/support.h"
 

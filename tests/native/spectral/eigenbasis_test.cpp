@@ -142,7 +142,7 @@ TEST(Eigenbasis, AsManyFunctionsAsVertices) {
   EXPECT_LT((basis.project(field, 8) - field).norm(), 1e-12);
 }
 
-// A space of some 900 dimensions, most of whose blocks are not compared with all before them.
+// A space of some 900 dimensions, of whose blocks two in five are not compared with all before.
 TEST(Eigenbasis, SlowManyFunctionsStayOrthonormal) {
   const SurfaceOperators operators = operators_of(zoo::perturbed_sphere(4, 3));
   const Eigenbasis basis = basis_of(operators, 256);

@@ -40,7 +40,7 @@ class HeldSystem {
   /// of what is added, whatever X is, so a solve that is taken up again and again, as rounds of an
   /// edit do, loses nothing and reads half of the memory.
   Points correction(const Points& residual) const;
-  /// The same of two residuals, in little more time than of one: the factor is read once.
+  /// The same of two residuals, in half as much time again as of one: the factor is read once.
   std::pair<Points, Points> corrections(const Points& one, const Points& two) const;
   /// Gradient with respect to `rhs` (n x 3, held rows 0) from the gradient with respect to `solve`.
   Points solve_backward(const Points& grad) const;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "core/lane_math.h"
 #include "core/prefetch.h"
@@ -111,6 +112,17 @@ SUPPLE_INLINE void turn(const RoundTask& task, Eigen::Index block, MatrixBlock& 
       vector[j][i] = (task.vectors[3 * faces(f, 0) + j] + task.vectors[3 * faces(f, 1) + j] +
                       task.vectors[3 * faces(f, 2) + j]) *
                      (0.25 / 3.0);
+    }
+    // Interpolation may lead to many turns: only what is left of the last one counts.
+    const double square =
+        vector[0][i] * vector[0][i] + vector[1][i] * vector[1][i] + vector[2][i] * vector[2][i];
+    constexpr double kWhole = 0.5 * std::numbers::pi;  // a quarter of a whole turn
+    if (square > kWhole * kWhole) {
+      const double angle = std::sqrt(square);
+      const double left = std::remainder(angle, kWhole) / angle;
+      for (int j = 0; j < 3; ++j) {
+        vector[j][i] *= left;
+      }
     }
   }
   MatrixBlock quarter, half;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One round of an edit, local part: what a Poisson solve is to add to the moved vertices. Those
 // that return n x 3 return grad^T A (T - J), with J the Jacobians of `moved` and T the target of
-// each face. start: S, the Jacobians of another pose than rest that the edit starts from, or
-// nullptr; Q: the rotation with the least |J - S Q|, to single precision.
+// each face. start: S, what the face is given before it turns (the Jacobians of another pose
+// than rest that the edit starts from, or a stretch), or nullptr; Q: the rotation with the least |J
+// - S Q|, to single precision.
 #pragma once
 
 #include "face_blocks.h"

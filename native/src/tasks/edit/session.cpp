@@ -117,7 +117,8 @@ struct EditSession::State {
   MatrixField rotations_since_start(const Points& points) const {
     return rotations_of(*editor->faces_, points, from_start());
   }
-  bool restores_next() const { return report.volume_kept && next + 2 == usable(); }
+  /// Whether the step after this one restores volume; never of the first, which starts undeformed.
+  bool restores_next() const { return report.volume_kept && next > 0 && next + 2 == usable(); }
   void round(bool use_network);
   void polish_pass();
   void restore_volume();
@@ -313,11 +314,11 @@ void EditSession::State::suggest() {
 
 void EditSession::State::correct(Points residual) {
   editor->soft_->add_residual(moved, soft_targets, residual);
-  if (next == 0 || !restores_next()) {
+  if (!restores_next()) {
     moved += editor->poisson_->correction(residual);
     return;
   }
-  // What remains to be done changes the shape so little that its volume's gradient stays the same.
+  // About this shape: along whatever way, the volume that is restored is counted exactly.
   auto [change, along] = editor->poisson_->corrections(residual, editor->volume_->gradient(moved));
   moved += change;
   way = std::move(along);
@@ -347,6 +348,7 @@ void EditSession::State::restore_volume() {
     way = editor->poisson_->correction(editor->volume_->gradient(moved));
   }
   editor->volume_->restore(kept_volumes, way, moved);
+  way.resize(0, 3);
 }
 
 void EditSession::State::pass() {

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "supple/geometry/pinned_laplacian.h"
-#include "supple/geometry/surface_operators.h"
 
 namespace supple {
 
