@@ -152,7 +152,7 @@ class Editor:
             network_rounds: how many of them, the last ones, use the network; None for the default.
             polish: passes that let the network's stretch turn with the result; None: the default.
             passes: the most towards least distortion at stiffness 1, and of "arap"; None for the
-                default.
+                default. Up to three quarters more at stiffness 1 while faces are turned over.
             network: False replaces it by the identity.
             loose_pieces: "follow" or "stay": what components without a handle do.
             keep_volume: whether closed components whose handles keep their size get back most of

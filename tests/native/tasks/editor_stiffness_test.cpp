@@ -48,6 +48,24 @@ TEST_F(Stiffness, StiffTurnsNoFaceOver) {
   }
 }
 
+// Hands pushed into the body, on few passes: a few more are made where faces are turned over still.
+TEST_F(Stiffness, SomeMorePassesWhereFacesAreTurnedOver) {
+  constexpr int kPasses = 24;
+  int more = 0;
+  for (uint64_t seed = 1; seed <= 8; ++seed) {
+    const Eigen::RowVector3d hand = mesh.vertices.colwise().maxCoeff(),
+                             middle = mesh.vertices.colwise().mean();
+    const Matrix3 turn = test::rotation(seed);
+    const std::vector<HandleTarget> targets = {
+        {}, {.matrix = test::affine(turn, 0.5 * (hand + middle) - hand * turn), .positions = {}}};
+    const EditResult got = editor->solve(targets, {.stiffness = 1.0, .passes = kPasses});
+    EXPECT_EQ(flipped_faces(mesh.vertices, mesh.faces, got.vertices), 0) << seed;
+    EXPECT_LE(got.report.passes, 2 * kPasses);
+    more += got.report.passes > kPasses ? 1 : 0;
+  }
+  EXPECT_GT(more, 0);
+}
+
 TEST_F(Stiffness, ArapReachesLessOfItsEnergyThanTheSlider) {
   const double least = arap({.method = EditMethod::arap});
   for (const double stiffness : {0.0, 0.5, 1.0}) {

@@ -57,7 +57,7 @@ struct EditOptions {
   /// Passes after the rounds that keep the network's stretch and let it turn with the result.
   int polish = 1;
   /// Most passes towards least distortion, of `arap` and where stiffness is 1; fewer where they
-  /// have converged.
+  /// have converged, up to three quarters more (`supple`) while faces are turned over.
   int passes = 80;
   bool network = true;
   /// Whether closed components whose handles keep their size get back most of the volume that the

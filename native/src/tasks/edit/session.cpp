@@ -16,9 +16,10 @@
 namespace supple {
 namespace {
 
-// Passes between two looks for folds, and how often they are stiffened at most.
-constexpr int kFoldInterval = 8;
-constexpr int kMostStiffenings = 10;
+// Passes between two looks for folds; and once all passes are made, while any are left: then so
+// many more, as a part of all, at most.
+constexpr int kFoldInterval = 8, kLateFoldInterval = 4;
+constexpr double kMostLatePasses = 0.75;
 
 // The network's stretch S goes no farther from the identity than this, |S - I|. Beyond are faces
 // that collapse: in its training, the inner sides of joints, where true poses cut into themselves.
@@ -147,7 +148,6 @@ struct EditSession::State {
   std::unique_ptr<DeformationEnergy> energy;
   std::unique_ptr<PulledEnergy> pulled;  // with the soft handles
   std::unique_ptr<Descent> descent;
-  int stiffenings = 0;
   int next = 0;  // step
   EditReport report;
 
@@ -225,7 +225,6 @@ void EditSession::State::aim(const std::vector<HandleTarget>& targets,
   energy.reset();
   stretch.clear();
   way.resize(0, 3);
-  stiffenings = 0;
   next = 0;
   report = EditReport{};
   report.network = with_network;
@@ -369,15 +368,20 @@ void EditSession::State::pass() {
   }
   descent->pass(moved);
   ++report.passes;
-  const bool look = descent->converged() || report.passes % kFoldInterval == 0;
-  if (stiff && look && stiffenings < kMostStiffenings && report.passes < passes) {
-    ++stiffenings;
-    if (static_cast<StiffEnergy&>(*energy).stiffen_folds(moved) > 0) {
+  const bool converged = descent->converged(), late = report.passes >= passes;
+  const int interval = late ? kLateFoldInterval : kFoldInterval;
+  const int since = late ? report.passes - passes : report.passes;
+  bool folds = late;  // not known to be gone
+  if (stiff && (converged || since % interval == 0)) {
+    folds = static_cast<StiffEnergy&>(*energy).stiffen_folds(moved) > 0;
+    if (folds) {
       descent->forget();
     }
   }
-  if (descent->converged()) {
+  if (converged && !folds) {
     next = step_count() - 1;  // nothing is left to do
+  } else if (stiff && late && folds && report.passes < (1.0 + kMostLatePasses) * passes) {
+    --next;  // once more
   }
 }
 
