@@ -133,16 +133,13 @@ class BlockKrylov {
       // the others it has only rounding, which the next pass takes out.
       if (pass == 0 && filled_ > kept_ + 2 * width_) {
         make_orthogonal(block, {last_two()}, below, coefficients);
-      } else if (filled_ > 0) {
+      } else {
         const std::vector<Columns> against = all ? whole() : rounding();
         const double found = make_orthogonal(block, against, below, coefficients);
         // Where there is too much, no later block is spared either.
         skips_ = skips_ && (pass == 0 || found < kMostRounding);
         complete = against.size() == 1 || found < kMostRounding;
         all = !complete;
-      } else {
-        make_orthogonal(block, {}, below, coefficients);
-        complete = true;
       }
       // block = Q T by the eigenvectors of its Gram matrix (SVQB, Stathopoulos and Wu 2002).
       Eigen::MatrixXd gram = tall_product<double>({block}, block);

@@ -9,13 +9,8 @@ BlockField in_blocks(const MatrixField& field) {
   BlockField result(static_cast<size_t>(block_count(field.rows())));
 #pragma omp parallel for schedule(static)
   for (Eigen::Index b = 0; b < block_count(field.rows()); ++b) {
-    for (Eigen::Index i = 0; i < kBlock; ++i) {
-      const Eigen::Index f = kBlock * b + i;
-      for (int e = 0; e < 9; ++e) {
-        result[static_cast<size_t>(b)].e[e][i] =
-            f < field.rows() ? field(f, e) : double(e % 4 == 0);
-      }
-    }
+    load_rows(field.row(kBlock * b).data(), std::min(kBlock, field.rows() - kBlock * b),
+              result[static_cast<size_t>(b)]);
   }
   return result;
 }

@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "supple/core/simd.h"
 #include "supple/geometry/surface_operators.h"
 
 namespace supple {
@@ -15,6 +16,15 @@ constexpr Eigen::Index kBlock = 8;
 struct alignas(64) MatrixBlock {
   double e[9][kBlock];
 };
+
+/// Sets a block to `count` matrices, rows of 9 numbers; those beyond become the identity.
+SUPPLE_INLINE void load_rows(const double* rows, Eigen::Index count, MatrixBlock& out) {
+  for (Eigen::Index i = 0; i < kBlock; ++i) {
+    for (int e = 0; e < 9; ++e) {
+      out.e[e][i] = i < count ? rows[9 * i + e] : double(e % 4 == 0);
+    }
+  }
+}
 
 inline Eigen::Index block_count(Eigen::Index faces) { return (faces + kBlock - 1) / kBlock; }
 

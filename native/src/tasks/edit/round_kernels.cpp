@@ -51,15 +51,6 @@ SUPPLE_INLINE void multiply(const MatrixBlock& a, const MatrixBlock& b, MatrixBl
   }
 }
 
-// rows: count x 9. Those beyond count become the identity.
-SUPPLE_INLINE void load_rows(const double* rows, Eigen::Index count, MatrixBlock& out) {
-  for (Eigen::Index i = 0; i < kBlock; ++i) {
-    for (int e = 0; e < 9; ++e) {
-      out.e[e][i] = i < count ? rows[9 * i + e] : double(e % 4 == 0);
-    }
-  }
-}
-
 // J = E1^-1 E2 of the moved faces.
 template <int Bytes>
 SUPPLE_INLINE void moved_jacobians(const RoundTask& task, Eigen::Index block, MatrixBlock& out) {
